@@ -1,0 +1,42 @@
+//! Ray queries: one trait, three backends.
+//!
+//! Backends are chosen at run time, once per render; everything inside is generic over [`Accel`], so
+//! that the hot loops dispatch statically.
+
+mod ray;
+
+pub use ray::*;
+
+/// Ray queries against one scene.
+///
+/// All queries count a triangle as hit from both sides. Triangles with a cut-out
+/// ([`TriangleMesh::cutout`](crate::scene::TriangleMesh::cutout)) are hit only where it is opaque. A
+/// hit exactly at either end of the valid interval may or may not be reported.
+pub trait Accel: Send + Sync {
+    /// Nearest hit of one ray.
+    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether anything lies on one ray.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Nearest hits of the packet's active lanes: `hit` and `ray.tfar` of lanes that hit are filled.
+    /// Lanes must come with `geom_id` and `inst_id` set to [`INVALID_ID`]; `N` is 4, 8 or 16.
+    fn intersect_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayHitPacket<N>,
+        coherence: Coherence,
+    );
+
+    /// The active lanes that are blocked. The packet's `tfar` is unspecified afterwards; `N` is 4, 8
+    /// or 16.
+    fn occluded_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayPacket<N>,
+        coherence: Coherence,
+    ) -> LaneMask;
+
+    /// Bytes held by the acceleration structure, without the scene's own vertices and indices.
+    fn memory_bytes(&self) -> usize;
+}

@@ -1,0 +1,5 @@
+//! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
+
+pub mod accel;
+pub mod scene;
+pub mod settings;

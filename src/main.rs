@@ -1,0 +1,3 @@
+//! The `lightmesh` program.
+
+fn main() {}

@@ -1,0 +1,33 @@
+//! Surface materials.
+
+use glam::Vec3;
+
+/// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (spec §7).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name from the file, for messages and overrides.
+    pub name: String,
+    /// k_d, linear RGB.
+    pub diffuse: Vec3,
+    /// k_s of the mirror reflection, linear RGB.
+    pub specular: Vec3,
+    /// Emiss, linear RGB; leaves the front side only unless `two_sided`.
+    pub emission: Vec3,
+    /// Whether front and back are alike.
+    pub two_sided: bool,
+    /// Whether camera and reflected rays pass through the back of a one-sided surface.
+    pub cull: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            diffuse: Vec3::splat(0.8),
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            two_sided: false,
+            cull: false,
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Triangle meshes and their instances.
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3};
+
+/// Vertex positions in object space, shared with the acceleration structure without a copy.
+///
+/// The buffer ends in one vertex of padding, since Embree reads four bytes past the last position.
+#[derive(Clone, Debug)]
+pub struct Positions(Arc<Vec<[f32; 3]>>);
+
+impl Positions {
+    /// Takes over a list of positions.
+    pub fn new(mut positions: Vec<[f32; 3]>) -> Self {
+        positions.reserve_exact(1);
+        positions.push([0.0; 3]);
+        Self(Arc::new(positions))
+    }
+
+    /// The positions, without the padding.
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[[f32; 3]] {
+        self.0.split_last().map_or(&[], |(_, rest)| rest)
+    }
+
+    /// The buffer with its padding vertex at the end.
+    pub fn padded(&self) -> &Arc<Vec<[f32; 3]>> {
+        &self.0
+    }
+}
+
+/// Which material each triangle has; indices into [`Scene::materials`](super::Scene::materials).
+#[derive(Clone, Debug, PartialEq)]
+pub enum TriangleMaterials {
+    /// One material for all triangles.
+    Uniform(u32),
+    /// One index per triangle.
+    PerTriangle(Vec<u32>),
+}
+
+impl TriangleMaterials {
+    /// The material of one triangle.
+    #[inline(always)]
+    pub fn of(&self, triangle: u32) -> u32 {
+        match self {
+            Self::Uniform(material) => *material,
+            Self::PerTriangle(materials) => materials.get(triangle as usize).copied().unwrap_or(0),
+        }
+    }
+}
+
+/// Tells whether a triangle is opaque at barycentric `(triangle, u, v)`; used by camera and shadow rays alike.
+pub type CutOut = Arc<dyn Fn(u32, f32, f32) -> bool + Send + Sync>;
+
+/// Triangles that share vertices: what an acceleration structure is built over.
+#[derive(Clone)]
+pub struct TriangleMesh {
+    /// Name from the file, for messages.
+    pub name: String,
+    /// Vertex positions.
+    pub positions: Positions,
+    /// Vertex indices, three per triangle; always within `positions`.
+    pub triangles: Arc<Vec<[u32; 3]>>,
+    /// Shading normals per vertex, unit length.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// Texture coordinates per vertex.
+    pub uvs: Option<Vec<[f32; 2]>>,
+    /// Linear RGB per vertex, which multiplies k_d.
+    pub colors: Option<Vec<[f32; 3]>>,
+    /// Materials.
+    pub materials: TriangleMaterials,
+    /// Where the triangles are cut out; `None` for solid geometry.
+    pub cutout: Option<CutOut>,
+}
+
+impl TriangleMesh {
+    /// The three corners of a triangle in object space.
+    #[inline(always)]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        let positions = self.positions.as_slice();
+        self.triangles[triangle as usize].map(|i| Vec3::from_array(positions[i as usize]))
+    }
+}
+
+/// A placed mesh.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Index into [`Scene::meshes`](super::Scene::meshes).
+    pub mesh: u32,
+    /// Object to world; `None` for a mesh that is already in world space, which backends put into
+    /// their top level without an instance node.
+    pub to_world: Option<Affine3A>,
+}

@@ -1,0 +1,32 @@
+//! The scene: what is rendered. Immutable once loaded.
+
+mod camera;
+mod light;
+mod material;
+mod mesh;
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+pub use camera::Camera;
+pub use light::{Falloff, PointLight};
+pub use material::Material;
+pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+
+/// Everything that is rendered, in world space of any unit of length.
+#[derive(Clone, Default)]
+pub struct Scene {
+    /// Unique geometry.
+    pub meshes: Vec<Arc<TriangleMesh>>,
+    /// Placements of the meshes; every mesh is placed at least once.
+    pub instances: Vec<Instance>,
+    /// Materials; index 0 always exists.
+    pub materials: Vec<Material>,
+    /// Point lights.
+    pub lights: Vec<PointLight>,
+    /// How light falls off with distance, φ1 of eq. (1).
+    pub falloff: Falloff,
+    /// Radiance of rays that leave the scene, linear RGB.
+    pub background: Vec3,
+}
