@@ -1,0 +1,1 @@
+//! Where a picture differs from a reference, in false colours.
