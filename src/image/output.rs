@@ -171,6 +171,11 @@ impl OutputTarget {
         self.file.path()
     }
 
+    /// The file without the format.
+    pub fn file(&self) -> &OutputFile {
+        &self.file
+    }
+
     /// The format that the picture will have.
     pub fn format(&self) -> ImageFormat {
         self.format
