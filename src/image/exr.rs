@@ -98,6 +98,12 @@ fn nearest_half(value: f32) -> f16 {
 ///
 /// If the file is damaged, or has only deep or subsampled data, other primaries than BT.709, or neither R, G, B nor Y.
 pub fn decode(bytes: &[u8]) -> Result<Image, DecodeError> {
+    // The crate's B44 decompressor, for one, overflows on damaged blocks where overflow is checked.
+    std::panic::catch_unwind(|| decode_layer(bytes))
+        .unwrap_or_else(|_| Err(damaged("a block is inconsistent")))
+}
+
+fn decode_layer(bytes: &[u8]) -> Result<Image, DecodeError> {
     let reader = ::exr::block::read(Cursor::new(bytes), false).map_err(decode_error)?;
     let (layer, selection) = select_layer(reader.headers())?;
     let header = &reader.headers()[layer];
