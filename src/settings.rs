@@ -20,6 +20,9 @@ pub struct Settings {
     pub weight_threshold: f32,
     /// Exposure of tone-mapped pictures, in stops.
     pub exposure: f32,
+    /// Samples per image block, which bounds the memory for camera paths and never changes the picture;
+    /// `None` for a good default.
+    pub block_pixels: Option<u64>,
     /// The light meshes.
     pub light_mesh: LightMeshSettings,
 }
@@ -33,6 +36,7 @@ impl Default for Settings {
             max_depth: 5,
             weight_threshold: 1e-3,
             exposure: 0.0,
+            block_pixels: None,
             light_mesh: LightMeshSettings::default(),
         }
     }
@@ -112,4 +116,6 @@ pub enum Estimator {
     Ratio,
     /// Mean visibility of every light.
     PerLight,
+    /// Irradiance by normal from a second-order basis; its cost per pixel doesn't depend on the lights.
+    Directional,
 }

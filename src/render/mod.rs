@@ -1,0 +1,266 @@
+//! Rendering as a wavefront (spec §9): camera paths of an image block → needed mesh points → evaluation in
+//! packets → shading.
+
+mod camera_rays;
+mod conventional;
+mod paths;
+mod stats;
+mod tiles;
+
+use std::time::Instant;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+pub use camera_rays::CameraRays;
+pub use stats::{MeshCounters, RayCounters, RenderStats, StageSeconds};
+
+use self::conventional::see_lights_from_surface;
+use self::paths::{PathVertex, TilePaths, trace_paths};
+use self::stats::add_since;
+use self::tiles::{Tile, blocks};
+use crate::accel::Accel;
+use crate::light_mesh::{
+    DirectMesh, LANES, LightTable, MeshError, NeededPoints, Neighbours, PointMask, Scratch, expand_bits,
+};
+use crate::scene::{Camera, Scene, SurfacePoint};
+use crate::settings::{Integrator, Settings};
+
+/// Linear RGB picture, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Columns and rows.
+    pub resolution: (u32, u32),
+    /// Radiance, linear RGB.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// Hears how far a render is; called from the thread that called [`render`].
+pub trait Progress {
+    /// A block is done: `done` of `total` pixels.
+    fn pixels(&self, done: u64, total: u64);
+}
+
+/// A listener that ignores all.
+impl Progress for () {
+    fn pixels(&self, _: u64, _: u64) {}
+}
+
+/// Light meshes of a scene; they keep their values from one render to the next.
+pub struct LightMeshes {
+    direct: DirectMesh,
+}
+
+impl LightMeshes {
+    /// Meshes over a scene, with no point known.
+    pub fn new(scene: &Scene, settings: &Settings) -> Result<Self, MeshError> {
+        Ok(Self { direct: DirectMesh::new(scene, &settings.light_mesh)? })
+    }
+}
+
+/// Renders with light meshes. `meshes` must have been made for the same scene and light-mesh settings.
+pub fn render_light_mesh<A: Accel>(
+    accel: &A,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    meshes: &mut LightMeshes,
+    progress: &dyn Progress,
+) -> (Film, RenderStats) {
+    let mut integrator = LightMeshIntegrator { accel, meshes };
+    let (film, mut stats) = wavefront(accel, scene, camera, settings, &mut integrator, progress);
+    let counters = &mut meshes.direct.points.counters;
+    counters.nearest_fallback += stats.mesh_points.direct.nearest_fallback;
+    stats.mesh_points.direct = *counters;
+    stats.light_mesh_bytes = meshes.direct.memory_bytes() as u64;
+    (film, stats)
+}
+
+/// Renders with one occlusion ray per light at every surface point.
+pub fn render_conventional<A: Accel>(
+    accel: &A,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> (Film, RenderStats) {
+    let lights = LightTable::new(&scene.lights, scene.falloff);
+    let mut integrator = ConventionalIntegrator { accel, lights };
+    wavefront(accel, scene, camera, settings, &mut integrator, progress)
+}
+
+/// Renders with the integrator that the settings name.
+pub fn render<A: Accel>(
+    accel: &A,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Film, RenderStats), MeshError> {
+    match settings.integrator {
+        Integrator::Conventional => Ok(render_conventional(accel, scene, camera, settings, progress)),
+        Integrator::LightMesh => {
+            let mut meshes = LightMeshes::new(scene, settings)?;
+            Ok(render_light_mesh(accel, scene, camera, settings, &mut meshes, progress))
+        }
+    }
+}
+
+/// What differs between the integrators: how the surface points of a block get their light.
+trait BlockIntegrator: Sync {
+    /// Makes ready what the surface points of a block need.
+    fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
+
+    /// Shades surface points: calls `emit(index, I(y))` for each.
+    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters;
+}
+
+/// What shading one tile counted.
+#[derive(Clone, Copy, Default)]
+struct ShadeCounters {
+    shadow_rays: u64,
+    direct_fallbacks: u64,
+}
+
+/// Pixels per block: enough to keep all threads busy and packets full, at some 100 bytes of path each.
+const BLOCK_PIXELS: u64 = 1 << 20;
+
+fn wavefront<A: Accel, I: BlockIntegrator>(
+    accel: &A,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    integrator: &mut I,
+    progress: &dyn Progress,
+) -> (Film, RenderStats) {
+    let (width, height) = settings.resolution;
+    let total = u64::from(width) * u64::from(height);
+    let mut film = Film { resolution: settings.resolution, pixels: vec![[0.0; 3]; total as usize] };
+    let mut stats = RenderStats::default();
+    let camera = CameraRays::new(camera, settings.resolution, settings.samples_per_pixel);
+    let block_pixels = settings.block_pixels.unwrap_or(BLOCK_PIXELS) / u64::from(settings.samples_per_pixel);
+    let mut done = 0;
+    for block in blocks(settings.resolution, block_pixels) {
+        let start = Instant::now();
+        let paths: Vec<TilePaths> = block
+            .par_iter()
+            .map(|tile| pulp::Arch::new().dispatch(|| trace_paths(accel, scene, &camera, settings, tile)))
+            .collect();
+        for tile in &paths {
+            stats.rays.camera += tile.camera_rays;
+            stats.rays.reflection += tile.reflection_rays;
+        }
+        add_since(&mut stats.seconds.paths, start);
+
+        let start = Instant::now();
+        integrator.prepare(&paths, &mut stats);
+        add_since(&mut stats.seconds.mesh, start);
+
+        let start = Instant::now();
+        let shaded: Vec<(Vec<Vec3>, ShadeCounters)> = block
+            .par_iter()
+            .zip(&paths)
+            .map(|(tile, paths)| shade_tile(integrator, tile, paths, settings.samples_per_pixel))
+            .collect();
+        for (tile, (pixels, counters)) in block.iter().zip(&shaded) {
+            for (row, values) in (tile.y..).zip(pixels.chunks(tile.width as usize)) {
+                let at = row as usize * width as usize + tile.x as usize;
+                for (pixel, value) in film.pixels[at..].iter_mut().zip(values) {
+                    *pixel = value.to_array();
+                }
+            }
+            stats.rays.shadow += counters.shadow_rays;
+            stats.mesh_points.direct.nearest_fallback += counters.direct_fallbacks;
+            done += tile.pixels() as u64;
+        }
+        add_since(&mut stats.seconds.shade, start);
+        progress.pixels(done, total);
+    }
+    (film, stats)
+}
+
+/// Radiance of a tile's pixels: eqs. (6) and (8), the sum over each path of weight · (Emiss + k_d · I).
+fn shade_tile<I: BlockIntegrator>(
+    integrator: &I,
+    tile: &Tile,
+    paths: &TilePaths,
+    samples: u32,
+) -> (Vec<Vec3>, ShadeCounters) {
+    let mut pixels = paths.background.clone();
+    debug_assert_eq!(pixels.len(), tile.pixels());
+    let counters = integrator.shade(&paths.vertices, &mut |vertex, illumination| {
+        let SurfacePoint { emission, diffuse, .. } = vertex.surface;
+        pixels[vertex.pixel as usize] += vertex.weight * (emission + diffuse * illumination);
+    });
+    let scale = 1.0 / samples as f32;
+    pixels.iter_mut().for_each(|pixel| *pixel *= scale);
+    (pixels, counters)
+}
+
+struct LightMeshIntegrator<'a, A> {
+    accel: &'a A,
+    meshes: &'a mut LightMeshes,
+}
+
+impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
+    fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
+        let points = &self.meshes.direct.points;
+        let needed: Vec<Vec<(u64, u64)>> = paths
+            .par_iter()
+            .map(|tile| {
+                pulp::Arch::new().dispatch(|| {
+                    let mut needed = NeededPoints::default();
+                    let mut neighbours = Neighbours::default();
+                    for vertex in &tile.vertices {
+                        points.neighbours(&vertex.surface, &mut neighbours);
+                        neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                    }
+                    needed.into_bricks().collect()
+                })
+            })
+            .collect();
+        let needed = PointMask::union(needed.into_iter().flatten());
+        stats.rays.shadow += self.meshes.direct.evaluate(self.accel, &needed);
+    }
+
+    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
+        pulp::Arch::new().dispatch(|| {
+            let mut counters = ShadeCounters::default();
+            let mut scratch = Scratch::default();
+            for vertex in vertices {
+                let (illumination, fallback) = self.meshes.direct.illumination(&vertex.surface, &mut scratch);
+                counters.direct_fallbacks += u64::from(fallback);
+                emit(vertex, illumination);
+            }
+            counters
+        })
+    }
+}
+
+struct ConventionalIntegrator<'a, A> {
+    accel: &'a A,
+    lights: LightTable,
+}
+
+impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
+    fn prepare(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
+
+    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
+        pulp::Arch::new().dispatch(|| {
+            let mut counters = ShadeCounters::default();
+            let mut bits = Vec::new();
+            let chunks = self.lights.chunks().len();
+            for group in vertices.chunks(LANES) {
+                counters.shadow_rays += see_lights_from_surface(self.accel, &self.lights, group, &mut bits);
+                for (point, vertex) in group.iter().enumerate() {
+                    let visible = &bits[point * chunks..][..chunks];
+                    let illumination = self.lights.illuminate(&vertex.surface, |chunk| {
+                        (visible[chunk] != 0).then(|| expand_bits(visible[chunk]))
+                    });
+                    emit(vertex, illumination);
+                }
+            }
+            counters
+        })
+    }
+}
