@@ -64,6 +64,8 @@ pub struct LightMeshSettings {
     pub hemisphere: bool,
     /// How direct illumination follows from the mesh.
     pub estimator: Estimator,
+    /// With [`Estimator::PerLight`]: what happens to lights on which the points of D_y disagree.
+    pub resolve: Resolve,
 }
 
 impl Default for LightMeshSettings {
@@ -74,6 +76,7 @@ impl Default for LightMeshSettings {
             neighbourhood: Neighbourhood::SmoothSphere,
             hemisphere: true,
             estimator: Estimator::PerLight,
+            resolve: Resolve::Average,
         }
     }
 }
@@ -118,4 +121,13 @@ pub enum Estimator {
     PerLight,
     /// Irradiance by normal from a second-order basis; its cost per pixel doesn't depend on the lights.
     Directional,
+}
+
+/// What `per-light` does with lights on which the points of D_y disagree (spec §4, hybrid shadows).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolve {
+    /// Their mean visibility: soft shadows.
+    Average,
+    /// One occlusion ray from the surface point: the sharp shadows of `conventional`.
+    Trace,
 }

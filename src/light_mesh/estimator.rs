@@ -71,7 +71,9 @@ impl DirectMesh {
             Estimator::Directional => {
                 let mut sums = [0.0f32; directional::STRIDE];
                 for &(slot, weight) in slots {
-                    for (sum, value) in sums.iter_mut().zip(self.values.values(slot)) {
+                    for (sum, value) in
+                        sums.iter_mut().zip(self.values.values::<{ directional::STRIDE }>(slot))
+                    {
                         *sum += weight * value;
                     }
                 }
@@ -108,6 +110,31 @@ impl DirectMesh {
             }
             Some(visible.map(|sum| sum * scale))
         })
+    }
+
+    /// What D_y says of the lights: per chunk the lights that all of D_y sees (`seen`), and those on which its
+    /// points disagree (`mixed`). Returns whether D_y was empty and the nearest point spoke for it.
+    #[inline(always)]
+    pub fn verdict(
+        &self,
+        surface: &SurfacePoint,
+        scratch: &mut Scratch,
+        seen: &mut [VisibilityBits],
+        mixed: &mut [VisibilityBits],
+    ) -> bool {
+        let fallback = self.points.neighbours(surface, &mut scratch.neighbours);
+        let chunks = self.lights.chunks().len();
+        seen.fill(VisibilityBits::MAX);
+        mixed.fill(0);
+        for (id, _) in scratch.neighbours.iter() {
+            let bits = self.values.bits(self.points.slot(id), chunks);
+            for ((all, any), bits) in seen.iter_mut().zip(&mut *mixed).zip(bits) {
+                *all &= bits;
+                *any |= bits;
+            }
+        }
+        mixed.iter_mut().zip(seen).for_each(|(any, all)| *any &= !*all);
+        fallback
     }
 
     /// Ĩ of eq. (3), and the same mean of the unoccluded field.

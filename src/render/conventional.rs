@@ -4,21 +4,20 @@ use super::paths::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::light_mesh::{LANES, LightTable, VisibilityBits};
 
-/// Traces the occlusion rays from up to 16 surface points to all lights, and counts them.
+/// Traces the occlusion rays from up to 16 surface points to their `undecided` lights, and counts them.
 ///
-/// `bits` gets, point by point, the chunks of visibility bits that
-/// [`LightTable::illuminate`] takes. Packets run from the points towards one light, which is the best form that
+/// `undecided` and `bits` hold, point by point, a chunk of bits for each chunk of the table; lights that turn out
+/// visible are added to `bits`. Packets run from the points towards one light, which is the best form that
 /// backends have for neighbouring points; lights below a point's horizon cost no ray.
 #[inline(always)]
 pub fn see_lights_from_surface<A: Accel>(
     accel: &A,
     lights: &LightTable,
     vertices: &[PathVertex],
-    bits: &mut Vec<VisibilityBits>,
+    undecided: &[VisibilityBits],
+    bits: &mut [VisibilityBits],
 ) -> u64 {
     let chunks = lights.chunks().len();
-    bits.clear();
-    bits.resize(vertices.len() * chunks, 0);
     let mut packet = RayPacket::<LANES>::empty();
     packet.tnear = [0.0; LANES];
     let mut normals = [[0.0f32; LANES]; 6];
@@ -35,7 +34,12 @@ pub fn see_lights_from_surface<A: Accel>(
     }
     let mut rays = 0;
     for (index, chunk) in lights.chunks().iter().enumerate() {
-        for light in 0..chunk.used.count_ones() as usize {
+        let any = (0..vertices.len()).fold(0, |any, point| any | undecided[point * chunks + index]);
+        for light in (0..LANES).filter(|light| any >> light & 1 == 1) {
+            let mut asked: LaneMask = 0;
+            for point in 0..vertices.len() {
+                asked |= LaneMask::from(undecided[point * chunks + index] >> light & 1) << point;
+            }
             let position = chunk.position.map(|axis| axis[light]);
             let mut active: LaneMask = 0;
             for lane in 0..LANES {
@@ -49,9 +53,9 @@ pub fn see_lights_from_surface<A: Accel>(
                 packet.dir_x[lane] = d[0];
                 packet.dir_y[lane] = d[1];
                 packet.dir_z[lane] = d[2];
-                // Lanes without a point have zero normals and stay inactive.
                 active |= LaneMask::from(cosine > 0.0 && side > 0.0) << lane;
             }
+            active &= asked;
             if active == 0 {
                 continue;
             }

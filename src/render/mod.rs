@@ -21,10 +21,11 @@ use self::stats::add_since;
 use self::tiles::{Tile, blocks};
 use crate::accel::Accel;
 use crate::light_mesh::{
-    DirectMesh, LANES, LightTable, MeshError, NeededPoints, Neighbours, PointMask, Scratch, expand_bits,
+    DirectMesh, LANES, LightTable, MeshError, NeededPoints, Neighbours, PointMask, Scratch, VisibilityBits,
+    expand_bits,
 };
 use crate::scene::{Camera, Scene, SurfacePoint};
-use crate::settings::{Integrator, Settings};
+use crate::settings::{Integrator, Resolve, Settings};
 
 /// Linear RGB picture, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +68,7 @@ pub fn render_light_mesh<A: Accel>(
     meshes: &mut LightMeshes,
     progress: &dyn Progress,
 ) -> (Film, RenderStats) {
-    let mut integrator = LightMeshIntegrator { accel, meshes };
+    let mut integrator = LightMeshIntegrator { accel, meshes, resolve: settings.light_mesh.resolve };
     let (film, mut stats) = wavefront(accel, scene, camera, settings, &mut integrator, progress);
     let counters = &mut meshes.direct.points.counters;
     counters.nearest_fallback += stats.mesh_points.direct.nearest_fallback;
@@ -200,6 +201,7 @@ fn shade_tile<I: BlockIntegrator>(
 struct LightMeshIntegrator<'a, A> {
     accel: &'a A,
     meshes: &'a mut LightMeshes,
+    resolve: Resolve,
 }
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
@@ -227,14 +229,54 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         pulp::Arch::new().dispatch(|| {
             let mut counters = ShadeCounters::default();
             let mut scratch = Scratch::default();
+            let direct = &self.meshes.direct;
+            if self.resolve == Resolve::Trace {
+                return shade_traced(self.accel, direct.lights(), vertices, emit, |vertex, seen, mixed| {
+                    direct.verdict(&vertex.surface, &mut scratch, seen, mixed)
+                });
+            }
             for vertex in vertices {
-                let (illumination, fallback) = self.meshes.direct.illumination(&vertex.surface, &mut scratch);
+                let (illumination, fallback) = direct.illumination(&vertex.surface, &mut scratch);
                 counters.direct_fallbacks += u64::from(fallback);
                 emit(vertex, illumination);
             }
             counters
         })
     }
+}
+
+/// Shades with occlusion rays from the surface points to those lights that `decide` leaves open.
+///
+/// `decide(vertex, seen, undecided)` fills in, per chunk, the lights known to be visible and the lights to ask; it
+/// returns whether it had to fall back to the nearest mesh point.
+#[inline(always)]
+fn shade_traced<A: Accel>(
+    accel: &A,
+    lights: &LightTable,
+    vertices: &[PathVertex],
+    emit: &mut dyn FnMut(&PathVertex, Vec3),
+    mut decide: impl FnMut(&PathVertex, &mut [VisibilityBits], &mut [VisibilityBits]) -> bool,
+) -> ShadeCounters {
+    let mut counters = ShadeCounters::default();
+    let chunks = lights.chunks().len();
+    let mut bits = vec![0; chunks * LANES];
+    let mut undecided = bits.clone();
+    for group in vertices.chunks(LANES) {
+        for (point, vertex) in group.iter().enumerate() {
+            let range = point * chunks..(point + 1) * chunks;
+            let fallback = decide(vertex, &mut bits[range.clone()], &mut undecided[range]);
+            counters.direct_fallbacks += u64::from(fallback);
+        }
+        counters.shadow_rays += see_lights_from_surface(accel, lights, group, &undecided, &mut bits);
+        for (point, vertex) in group.iter().enumerate() {
+            let visible = &bits[point * chunks..];
+            let illumination = lights.illuminate(&vertex.surface, |chunk| {
+                (visible[chunk] != 0).then(|| expand_bits(visible[chunk]))
+            });
+            emit(vertex, illumination);
+        }
+    }
+    counters
 }
 
 struct ConventionalIntegrator<'a, A> {
@@ -247,20 +289,13 @@ impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
 
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
         pulp::Arch::new().dispatch(|| {
-            let mut counters = ShadeCounters::default();
-            let mut bits = Vec::new();
-            let chunks = self.lights.chunks().len();
-            for group in vertices.chunks(LANES) {
-                counters.shadow_rays += see_lights_from_surface(self.accel, &self.lights, group, &mut bits);
-                for (point, vertex) in group.iter().enumerate() {
-                    let visible = &bits[point * chunks..][..chunks];
-                    let illumination = self.lights.illuminate(&vertex.surface, |chunk| {
-                        (visible[chunk] != 0).then(|| expand_bits(visible[chunk]))
-                    });
-                    emit(vertex, illumination);
+            shade_traced(self.accel, &self.lights, vertices, emit, |_, seen, undecided| {
+                seen.fill(0);
+                for (bits, chunk) in undecided.iter_mut().zip(self.lights.chunks()) {
+                    *bits = chunk.used;
                 }
-            }
-            counters
+                false
+            })
         })
     }
 }
