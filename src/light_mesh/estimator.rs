@@ -24,7 +24,7 @@ pub struct DirectMesh {
 /// Working memory of one thread while it shades.
 #[derive(Default)]
 pub struct Scratch {
-    neighbours: Neighbours,
+    pub(super) neighbours: Neighbours,
     slots: Vec<(u32, f32)>,
 }
 
@@ -32,7 +32,7 @@ impl DirectMesh {
     /// Mesh over a scene, with no point known.
     pub fn new(scene: &Scene, settings: &LightMeshSettings) -> Result<Self, MeshError> {
         Ok(Self {
-            points: MeshPoints::new(scene.bounds(), settings)?,
+            points: MeshPoints::new(scene.bounds(), &settings.points)?,
             values: DirectValues::default(),
             lights: LightTable::new(&scene.lights, scene.falloff),
             estimator: settings.estimator,

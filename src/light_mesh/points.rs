@@ -6,7 +6,7 @@ use super::lattice::Lattice;
 use super::neighbours::{Ball, Neighbours};
 use super::store::{PointMask, SlotTable, UNKNOWN};
 use crate::scene::{Bounds, SurfacePoint};
-use crate::settings::{LightMeshSettings, Neighbourhood, Radius, Spacing};
+use crate::settings::{Neighbourhood, PointSettings, Radius, Spacing};
 
 /// How often the points of a light mesh were asked for and evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -45,7 +45,7 @@ pub enum MeshError {
 
 impl MeshPoints {
     /// The points that `settings` ask for over a scene of the given bounds, all unknown.
-    pub fn new(bounds: Bounds, settings: &LightMeshSettings) -> Result<Self, MeshError> {
+    pub fn new(bounds: Bounds, settings: &PointSettings) -> Result<Self, MeshError> {
         let spacing = match settings.spacing {
             Spacing::Units(spacing) => spacing,
             Spacing::Auto => {

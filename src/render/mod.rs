@@ -21,11 +21,11 @@ use self::stats::add_since;
 use self::tiles::{Tile, blocks};
 use crate::accel::Accel;
 use crate::light_mesh::{
-    DirectMesh, LANES, LightTable, MeshError, NeededPoints, Neighbours, PointMask, Scratch, VisibilityBits,
-    expand_bits,
+    DirectMesh, IndirectMesh, LANES, LightTable, MeshError, MeshPoints, NeededPoints, Neighbours, PointMask,
+    Scratch, VisibilityBits, expand_bits,
 };
 use crate::scene::{Camera, Scene, SurfacePoint};
-use crate::settings::{Integrator, Resolve, Settings};
+use crate::settings::{Estimator, Integrator, Resolve, Settings};
 
 /// Linear RGB picture, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,12 +50,17 @@ impl Progress for () {
 /// Light meshes of a scene; they keep their values from one render to the next.
 pub struct LightMeshes {
     direct: DirectMesh,
+    indirect: Option<IndirectMesh>,
 }
 
 impl LightMeshes {
     /// Meshes over a scene, with no point known.
     pub fn new(scene: &Scene, settings: &Settings) -> Result<Self, MeshError> {
-        Ok(Self { direct: DirectMesh::new(scene, &settings.light_mesh)? })
+        let indirect = settings.light_mesh.indirect.as_ref();
+        Ok(Self {
+            direct: DirectMesh::new(scene, &settings.light_mesh)?,
+            indirect: indirect.map(|indirect| IndirectMesh::new(scene, indirect)).transpose()?,
+        })
     }
 }
 
@@ -68,12 +73,18 @@ pub fn render_light_mesh<A: Accel>(
     meshes: &mut LightMeshes,
     progress: &dyn Progress,
 ) -> (Film, RenderStats) {
-    let mut integrator = LightMeshIntegrator { accel, meshes, resolve: settings.light_mesh.resolve };
+    let mut integrator = LightMeshIntegrator { accel, scene, settings, meshes };
     let (film, mut stats) = wavefront(accel, scene, camera, settings, &mut integrator, progress);
     let counters = &mut meshes.direct.points.counters;
     counters.nearest_fallback += stats.mesh_points.direct.nearest_fallback;
     stats.mesh_points.direct = *counters;
     stats.light_mesh_bytes = meshes.direct.memory_bytes() as u64;
+    if let Some(indirect) = &mut meshes.indirect {
+        let counters = &mut indirect.points.counters;
+        counters.nearest_fallback += stats.mesh_points.indirect.nearest_fallback;
+        stats.mesh_points.indirect = *counters;
+        stats.light_mesh_bytes += indirect.memory_bytes() as u64;
+    }
     (film, stats)
 }
 
@@ -86,7 +97,7 @@ pub fn render_conventional<A: Accel>(
     progress: &dyn Progress,
 ) -> (Film, RenderStats) {
     let lights = LightTable::new(&scene.lights, scene.falloff);
-    let mut integrator = ConventionalIntegrator { accel, lights };
+    let mut integrator = ConventionalIntegrator { accel, lights, scale: direct_scale(settings) };
     wavefront(accel, scene, camera, settings, &mut integrator, progress)
 }
 
@@ -109,10 +120,23 @@ pub fn render<A: Accel>(
 
 /// What differs between the integrators: how the surface points of a block get their light.
 trait BlockIntegrator: Sync {
+    /// Whether there are mesh points that have to be evaluated for the whole image at once.
+    fn wants_whole_image(&self) -> bool {
+        false
+    }
+
+    /// Those of them that the paths need: bricks and masks.
+    fn needed_for_whole_image(&self, _paths: &[TilePaths]) -> Vec<(u64, u64)> {
+        Vec::new()
+    }
+
+    /// Evaluates what [`needed_for_whole_image`](BlockIntegrator::needed_for_whole_image) gave for all blocks.
+    fn prepare_whole_image(&mut self, _needed: PointMask, _stats: &mut RenderStats) {}
+
     /// Makes ready what the surface points of a block need.
     fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
 
-    /// Shades surface points: calls `emit(index, I(y))` for each.
+    /// Shades surface points: calls `emit(vertex, E)` for each, E such that k_d·E is the light sent back.
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters;
 }
 
@@ -121,6 +145,7 @@ trait BlockIntegrator: Sync {
 struct ShadeCounters {
     shadow_rays: u64,
     direct_fallbacks: u64,
+    indirect_fallbacks: u64,
 }
 
 /// Pixels per block: enough to keep all threads busy and packets full, at some 100 bytes of path each.
@@ -140,18 +165,43 @@ fn wavefront<A: Accel, I: BlockIntegrator>(
     let mut stats = RenderStats::default();
     let camera = CameraRays::new(camera, settings.resolution, settings.samples_per_pixel);
     let block_pixels = settings.block_pixels.unwrap_or(BLOCK_PIXELS) / u64::from(settings.samples_per_pixel);
-    let mut done = 0;
-    for block in blocks(settings.resolution, block_pixels) {
+    let blocks = blocks(settings.resolution, block_pixels);
+    let trace_block = |block: &[Tile], stats: &mut RenderStats| -> Vec<TilePaths> {
         let start = Instant::now();
-        let paths: Vec<TilePaths> = block
+        let paths = block
             .par_iter()
             .map(|tile| pulp::Arch::new().dispatch(|| trace_paths(accel, scene, &camera, settings, tile)))
             .collect();
+        add_since(&mut stats.seconds.paths, start);
+        paths
+    };
+
+    // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
+    let mut only_block = None;
+    let mut needed = Vec::new();
+    for block in &blocks {
+        if !integrator.wants_whole_image() {
+            break;
+        }
+        let paths = trace_block(block, &mut stats);
+        needed.extend(integrator.needed_for_whole_image(&paths));
+        if blocks.len() == 1 {
+            only_block = Some(paths);
+        }
+    }
+    if integrator.wants_whole_image() {
+        let start = Instant::now();
+        integrator.prepare_whole_image(PointMask::union(needed), &mut stats);
+        add_since(&mut stats.seconds.mesh, start);
+    }
+
+    let mut done = 0;
+    for block in &blocks {
+        let paths = only_block.take().unwrap_or_else(|| trace_block(block, &mut stats));
         for tile in &paths {
             stats.rays.camera += tile.camera_rays;
             stats.rays.reflection += tile.reflection_rays;
         }
-        add_since(&mut stats.seconds.paths, start);
 
         let start = Instant::now();
         integrator.prepare(&paths, &mut stats);
@@ -172,6 +222,7 @@ fn wavefront<A: Accel, I: BlockIntegrator>(
             }
             stats.rays.shadow += counters.shadow_rays;
             stats.mesh_points.direct.nearest_fallback += counters.direct_fallbacks;
+            stats.mesh_points.indirect.nearest_fallback += counters.indirect_fallbacks;
             done += tile.pixels() as u64;
         }
         add_since(&mut stats.seconds.shade, start);
@@ -200,49 +251,97 @@ fn shade_tile<I: BlockIntegrator>(
 
 struct LightMeshIntegrator<'a, A> {
     accel: &'a A,
+    scene: &'a Scene,
+    settings: &'a Settings,
     meshes: &'a mut LightMeshes,
-    resolve: Resolve,
+}
+
+/// The mesh points in the neighbourhoods of the paths' surface points: bricks and masks, unordered.
+fn needed_by(paths: &[TilePaths], points: &MeshPoints) -> Vec<(u64, u64)> {
+    let parts: Vec<Vec<(u64, u64)>> = paths
+        .par_iter()
+        .map(|tile| {
+            pulp::Arch::new().dispatch(|| {
+                let mut needed = NeededPoints::default();
+                let mut neighbours = Neighbours::default();
+                for vertex in &tile.vertices {
+                    points.neighbours(&vertex.surface, &mut neighbours);
+                    neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                }
+                needed.into_bricks().collect()
+            })
+        })
+        .collect();
+    parts.concat()
 }
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
+    fn wants_whole_image(&self) -> bool {
+        self.meshes.indirect.is_some()
+    }
+
+    fn needed_for_whole_image(&self, paths: &[TilePaths]) -> Vec<(u64, u64)> {
+        self.meshes.indirect.as_ref().map_or(Vec::new(), |indirect| needed_by(paths, &indirect.points))
+    }
+
+    fn prepare_whole_image(&mut self, needed: PointMask, stats: &mut RenderStats) {
+        let LightMeshes { direct, indirect } = &mut *self.meshes;
+        if let Some(indirect) = indirect {
+            let scale = direct_scale(self.settings);
+            let rays = indirect.evaluate(self.accel, self.scene, direct, scale, needed);
+            stats.rays.indirect += rays.indirect;
+            stats.rays.shadow += rays.shadow;
+        }
+    }
+
     fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
-        let points = &self.meshes.direct.points;
-        let needed: Vec<Vec<(u64, u64)>> = paths
-            .par_iter()
-            .map(|tile| {
-                pulp::Arch::new().dispatch(|| {
-                    let mut needed = NeededPoints::default();
-                    let mut neighbours = Neighbours::default();
-                    for vertex in &tile.vertices {
-                        points.neighbours(&vertex.surface, &mut neighbours);
-                        neighbours.iter().for_each(|(id, _)| needed.insert(id));
-                    }
-                    needed.into_bricks().collect()
-                })
-            })
-            .collect();
-        let needed = PointMask::union(needed.into_iter().flatten());
+        let needed = PointMask::union(needed_by(paths, &self.meshes.direct.points));
         stats.rays.shadow += self.meshes.direct.evaluate(self.accel, &needed);
     }
 
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
         pulp::Arch::new().dispatch(|| {
-            let mut counters = ShadeCounters::default();
+            let scale = direct_scale(self.settings);
+            let LightMeshes { direct, indirect } = &*self.meshes;
             let mut scratch = Scratch::default();
-            let direct = &self.meshes.direct;
-            if self.resolve == Resolve::Trace {
-                return shade_traced(self.accel, direct.lights(), vertices, emit, |vertex, seen, mixed| {
-                    direct.verdict(&vertex.surface, &mut scratch, seen, mixed)
-                });
-            }
-            for vertex in vertices {
-                let (illumination, fallback) = direct.illumination(&vertex.surface, &mut scratch);
-                counters.direct_fallbacks += u64::from(fallback);
+            let mut indirect_fallbacks = 0;
+            let mut add_indirect = |vertex: &PathVertex, direct_light: Vec3, scratch: &mut Scratch| {
+                let mut illumination = direct_light * scale;
+                if let Some(indirect) = indirect {
+                    let (light, fallback) = indirect.illumination(&vertex.surface, scratch);
+                    illumination += light;
+                    indirect_fallbacks += u64::from(fallback);
+                }
                 emit(vertex, illumination);
+            };
+            let mut counters = ShadeCounters::default();
+            if self.settings.light_mesh.resolve == Resolve::Trace
+                && self.settings.light_mesh.estimator == Estimator::PerLight
+            {
+                let mut indirect_scratch = Scratch::default();
+                counters = shade_traced(
+                    self.accel,
+                    direct.lights(),
+                    vertices,
+                    &mut |vertex, light| add_indirect(vertex, light, &mut indirect_scratch),
+                    |vertex, seen, mixed| direct.verdict(&vertex.surface, &mut scratch, seen, mixed),
+                );
+            } else {
+                for vertex in vertices {
+                    let (light, fallback) = direct.illumination(&vertex.surface, &mut scratch);
+                    counters.direct_fallbacks += u64::from(fallback);
+                    add_indirect(vertex, light, &mut scratch);
+                }
             }
+            counters.indirect_fallbacks = indirect_fallbacks;
             counters
         })
     }
+}
+
+/// What I(y) is multiplied by before k_d: 1, or 1/π for Lambertian reflectors (spec §12).
+fn direct_scale(settings: &Settings) -> f32 {
+    if settings.lambertian { std::f32::consts::FRAC_1_PI } else { 1.0 }
 }
 
 /// Shades with occlusion rays from the surface points to those lights that `decide` leaves open.
@@ -282,6 +381,7 @@ fn shade_traced<A: Accel>(
 struct ConventionalIntegrator<'a, A> {
     accel: &'a A,
     lights: LightTable,
+    scale: f32,
 }
 
 impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
@@ -289,7 +389,8 @@ impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
 
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
         pulp::Arch::new().dispatch(|| {
-            shade_traced(self.accel, &self.lights, vertices, emit, |_, seen, undecided| {
+            let mut scaled = |vertex: &PathVertex, light: Vec3| emit(vertex, light * self.scale);
+            shade_traced(self.accel, &self.lights, vertices, &mut scaled, |_, seen, undecided| {
                 seen.fill(0);
                 for (bits, chunk) in undecided.iter_mut().zip(self.lights.chunks()) {
                     *bits = chunk.used;
