@@ -8,8 +8,10 @@ mod lattice;
 mod lights;
 mod neighbours;
 mod points;
+mod scattered;
 mod sphere;
 mod store;
+mod tiled;
 
 pub use direct::{Basis, DirectValues};
 pub use estimator::{DirectMesh, Scratch};

@@ -60,6 +60,11 @@ impl Neighbours {
         self.weights.push(weight);
     }
 
+    /// Adds `first` to all ids.
+    pub fn offset_ids(&mut self, first: u64) {
+        self.ids.iter_mut().for_each(|id| *id += first);
+    }
+
     /// Whether there are none.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {

@@ -5,6 +5,7 @@ mod camera;
 mod light;
 mod material;
 mod mesh;
+pub mod random;
 mod surface;
 
 use std::sync::Arc;
