@@ -1,5 +1,7 @@
 //! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
 
 pub mod accel;
+pub mod light_mesh;
+pub mod render;
 pub mod scene;
 pub mod settings;

@@ -1,18 +1,22 @@
 //! The scene: what is rendered. Immutable once loaded.
 
+mod bounds;
 mod camera;
 mod light;
 mod material;
 mod mesh;
+mod surface;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
+pub use bounds::Bounds;
 pub use camera::Camera;
 pub use light::{Falloff, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use surface::SurfacePoint;
 
 /// Everything that is rendered, in world space of any unit of length.
 #[derive(Clone, Default)]
