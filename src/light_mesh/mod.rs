@@ -5,6 +5,7 @@ mod directional;
 mod estimator;
 mod indirect;
 mod lattice;
+mod leaks;
 mod lights;
 mod neighbours;
 mod points;

@@ -8,7 +8,7 @@ use super::scattered::ScatteredPoints;
 use super::store::{PointMask, SlotTable, UNKNOWN};
 use super::tiled::{TileLayout, TiledPoints};
 use crate::scene::{Bounds, SurfacePoint};
-use crate::settings::{Neighbourhood, PointLayout, PointSettings, Radius, Spacing};
+use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Spacing};
 
 /// How often the points of a light mesh were asked for and evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -66,6 +66,7 @@ pub struct MeshPoints {
     table: SlotTable,
     neighbourhood: Neighbourhood,
     hemisphere: bool,
+    leaks: Leaks,
     /// Counters since creation.
     pub counters: PointCounters,
 }
@@ -126,6 +127,7 @@ impl MeshPoints {
             table: SlotTable::new(bricks),
             neighbourhood: settings.neighbourhood,
             hemisphere: settings.hemisphere,
+            leaks: settings.leaks,
             counters: PointCounters { total, ..PointCounters::default() },
         })
     }
@@ -186,6 +188,11 @@ impl MeshPoints {
         let slot = self.table.slot(id);
         debug_assert_ne!(slot, UNKNOWN, "a point that is used was never claimed");
         slot
+    }
+
+    /// What is done against leaks.
+    pub fn leaks(&self) -> Leaks {
+        self.leaks
     }
 
     /// R outside of all regions, scene units.
