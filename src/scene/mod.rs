@@ -2,8 +2,10 @@
 
 mod camera;
 mod light;
+pub mod load;
 mod material;
 mod mesh;
+pub mod random;
 
 use std::sync::Arc;
 
