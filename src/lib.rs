@@ -1,5 +1,6 @@
 //! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
 
 pub mod accel;
+pub mod cli;
 pub mod scene;
 pub mod settings;

@@ -1,6 +1,7 @@
 //! The scene: what is rendered. Immutable once loaded.
 
 mod camera;
+pub mod generate;
 mod light;
 pub mod load;
 mod material;

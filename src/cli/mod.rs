@@ -1,0 +1,3 @@
+//! Subcommands of the program.
+
+pub mod generate;
