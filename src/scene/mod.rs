@@ -2,7 +2,9 @@
 
 mod bounds;
 mod camera;
+pub mod generate;
 mod light;
+pub mod load;
 mod material;
 mod mesh;
 pub mod random;
