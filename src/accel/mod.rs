@@ -3,8 +3,12 @@
 //! Backends are chosen at run time, once per render; everything inside is generic over [`Accel`], so
 //! that the hot loops dispatch statically.
 
+mod brute_force;
+pub mod bvh;
 mod ray;
 
+pub use brute_force::BruteForceAccel;
+pub use bvh::BvhAccel;
 pub use ray::*;
 
 /// Ray queries against one scene.
