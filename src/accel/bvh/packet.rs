@@ -67,9 +67,9 @@ impl<const W: usize> PacketRays<W> {
             rays.t_near[lane] = near;
             rays.t_far[lane] = t_far[lane].min(f32::MAX);
             for axis in 0..3 {
-                let reciprocal = safe_reciprocal(d[axis], largest);
+                let (reciprocal, scaled) = safe_reciprocal(o[axis], d[axis], largest);
                 rays.reciprocal[axis][lane] = reciprocal;
-                rays.scaled_origin[axis][lane] = o[axis] * reciprocal;
+                rays.scaled_origin[axis][lane] = scaled;
             }
             let signs = d.map(|d| d.to_bits() >> 31);
             rays.kinds[lane] =
