@@ -2,5 +2,8 @@
 
 pub mod accel;
 pub mod cli;
+pub mod image;
+pub mod light_mesh;
+pub mod render;
 pub mod scene;
 pub mod settings;

@@ -3,7 +3,11 @@
 //! Plain values, checked where they are read (scene file or command line); the rest of the library
 //! relies on the ranges stated here.
 
+use std::sync::Arc;
+
 use glam::Vec3;
+
+use crate::scene::Bounds;
 
 /// Settings of one render.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +24,12 @@ pub struct Settings {
     pub weight_threshold: f32,
     /// Exposure of tone-mapped pictures, in stops.
     pub exposure: f32,
+    /// Samples per image block, which bounds the memory for camera paths and never changes the picture;
+    /// `None` for a good default.
+    pub block_pixels: Option<u64>,
+    /// Surfaces are Lambertian reflectors of albedo k_d, so that direct light counts k_d/π (spec §12); otherwise k_d
+    /// alone, as in the paper.
+    pub lambertian: bool,
     /// The light meshes.
     pub light_mesh: LightMeshSettings,
 }
@@ -33,6 +43,8 @@ impl Default for Settings {
             max_depth: 5,
             weight_threshold: 1e-3,
             exposure: 0.0,
+            block_pixels: None,
+            lambertian: false,
             light_mesh: LightMeshSettings::default(),
         }
     }
@@ -50,6 +62,32 @@ pub enum Integrator {
 /// Settings of the light meshes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightMeshSettings {
+    /// Points of the direct light mesh.
+    pub points: PointSettings,
+    /// How direct illumination follows from the mesh.
+    pub estimator: Estimator,
+    /// With [`Estimator::PerLight`]: what happens to lights on which the points of D_y disagree.
+    pub resolve: Resolve,
+    /// The indirect light mesh; `None` for direct light alone.
+    pub indirect: Option<IndirectSettings>,
+}
+
+impl Default for LightMeshSettings {
+    fn default() -> Self {
+        Self {
+            points: PointSettings::default(),
+            estimator: Estimator::PerLight,
+            resolve: Resolve::Average,
+            indirect: None,
+        }
+    }
+}
+
+/// Where mesh points lie, and which of them a surface point takes (spec §3, §8).
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointSettings {
+    /// How the points are laid out.
+    pub layout: PointLayout,
     /// Distance between neighbouring mesh points.
     pub spacing: Spacing,
     /// Radius R of D_y.
@@ -58,20 +96,115 @@ pub struct LightMeshSettings {
     pub neighbourhood: Neighbourhood,
     /// Drop points of D_y behind the tangent plane at y.
     pub hemisphere: bool,
-    /// How direct illumination follows from the mesh.
-    pub estimator: Estimator,
+    /// What keeps light from leaking through walls.
+    pub leaks: Leaks,
+    /// Boxes with a spacing and radius of their own; where they overlap, the last one holds.
+    pub regions: Vec<Region>,
 }
 
-impl Default for LightMeshSettings {
+impl Default for PointSettings {
     fn default() -> Self {
         Self {
+            layout: PointLayout::Regular,
             spacing: Spacing::Auto,
             radius: Radius::Spacings(2.0),
             neighbourhood: Neighbourhood::SmoothSphere,
             hemisphere: true,
-            estimator: Estimator::PerLight,
+            leaks: Leaks::Visibility,
+            regions: Vec::new(),
         }
     }
+}
+
+/// Settings of the indirect light mesh (spec §5).
+#[derive(Clone, Debug, PartialEq)]
+pub struct IndirectSettings {
+    /// Points of the indirect light mesh, which may differ from those of the direct one.
+    pub points: PointSettings,
+    /// N, the number of directions traced from each mesh point, at least 1.
+    pub directions: u32,
+    /// Times that light is passed on between surfaces, at least 1; 1 is the paper's.
+    pub bounces: u32,
+    /// Further bounces end when no value changes by more than this share of the mesh's largest value.
+    pub tolerance: f32,
+    /// What is kept per mesh point.
+    pub form: IndirectForm,
+    /// Scale of the stored values.
+    pub normalization: Normalization,
+}
+
+impl Default for IndirectSettings {
+    fn default() -> Self {
+        Self {
+            points: PointSettings::default(),
+            directions: 256,
+            bounces: 1,
+            tolerance: 1e-3,
+            form: IndirectForm::Directional,
+            normalization: Normalization::Mean,
+        }
+    }
+}
+
+/// What the indirect light mesh keeps per point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IndirectForm {
+    /// One RGB value, whatever the surface's normal: the paper's.
+    Scalar,
+    /// Irradiance by normal.
+    Directional,
+}
+
+/// Scale of IndirectLight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Normalization {
+    /// Mean over directions: the integral of eq. (4) over 4π.
+    Mean,
+    /// The integral as printed.
+    Integral,
+}
+
+/// Layout of mesh points (spec §8).
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointLayout {
+    /// Regular grid: the paper's.
+    Regular,
+    /// Corners and centres of cubes whose edge is the spacing.
+    BodyCentred,
+    /// One point anywhere in each cube of a regular grid.
+    Jittered {
+        /// Seed of the jitter.
+        seed: u64,
+    },
+    /// As dense as the regular grid, without its rows.
+    BlueNoise {
+        /// Seed of the layout.
+        seed: u64,
+    },
+    /// Given positions, at least one; there is no spacing.
+    List(Arc<Vec<Vec3>>),
+}
+
+/// Box within which spacing and radius differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// The box, world space.
+    pub bounds: Bounds,
+    /// Spacing there; `None` for that of the whole.
+    pub spacing: Option<Vec3>,
+    /// R there, scene units; `None` for what the radius setting gives with the region's spacing.
+    pub radius: Option<f32>,
+}
+
+/// What keeps light from leaking through walls, and darkness out of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leaks {
+    /// Nothing: all points of D_y count.
+    Allow,
+    /// Points that see mostly back faces of one-sided surfaces lie inside of something and don't count.
+    Invalidate,
+    /// Where the points of D_y disagree, only those count that the surface point sees.
+    Visibility,
 }
 
 /// Distance between neighbouring mesh points.
@@ -112,4 +245,15 @@ pub enum Estimator {
     Ratio,
     /// Mean visibility of every light.
     PerLight,
+    /// Irradiance by normal from a second-order basis; its cost per pixel doesn't depend on the lights.
+    Directional,
+}
+
+/// What `per-light` does with lights on which the points of D_y disagree (spec §4, hybrid shadows).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolve {
+    /// Their mean visibility: soft shadows.
+    Average,
+    /// One occlusion ray from the surface point: the sharp shadows of `conventional`.
+    Trace,
 }

@@ -3,8 +3,12 @@
 //! Backends are chosen at run time, once per render; everything inside is generic over [`Accel`], so
 //! that the hot loops dispatch statically.
 
+#[cfg(feature = "embree")]
+mod embree;
 mod ray;
 
+#[cfg(feature = "embree")]
+pub use embree::{EmbreeAccel, EmbreeError};
 pub use ray::*;
 
 /// Ray queries against one scene.

@@ -1,3 +1,4 @@
-//! Subcommands of the program.
+//! The subcommands of the program, one file each.
 
+pub mod compare;
 pub mod generate;

@@ -1,5 +1,6 @@
 //! The scene: what is rendered. Immutable once loaded.
 
+mod bounds;
 mod camera;
 pub mod generate;
 mod light;
@@ -7,15 +8,18 @@ pub mod load;
 mod material;
 mod mesh;
 pub mod random;
+mod surface;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
+pub use bounds::Bounds;
 pub use camera::Camera;
 pub use light::{Falloff, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use surface::SurfacePoint;
 
 /// Everything that is rendered, in world space of any unit of length.
 #[derive(Clone, Default)]

@@ -7,6 +7,10 @@
 /// Id that stands for "nothing was hit" (`RTC_INVALID_GEOMETRY_ID`).
 pub const INVALID_ID: u32 = u32::MAX;
 
+/// Largest magnitude of a coordinate that Embree works with (its `FLT_LARGE`). Triangles that reach
+/// beyond it are left out of a scene; Debian's builds abort on rays that start or point beyond it.
+pub const MAX_COORDINATE: f32 = 1.844e18;
+
 /// Packet of `N` rays as a structure of arrays, `N` being 4, 8 or 16 (`RTCRay4`, `RTCRay8`, `RTCRay16`).
 ///
 /// A ray is `org + t * dir` for `tnear <= t <= tfar`; `dir` need not be normalised, `t` is in units of
@@ -92,6 +96,26 @@ impl<const N: usize> RayPacket<N> {
             id: [0; N],
             flags: [0; N],
         }
+    }
+
+    /// Which lanes hold a ray that can hit something: −1 for those, 0 for the others.
+    ///
+    /// Origin and direction must lie within ±`largest` (so they aren't NaN), and the interval must be one:
+    /// 0 ≤ `tnear` ≤ `tfar`.
+    #[inline(always)]
+    pub fn valid_lanes(&self, largest: f32) -> [i32; N] {
+        let mut valid = [0; N];
+        for (lane, valid) in valid.iter_mut().enumerate() {
+            let within = (self.org_x[lane].abs() <= largest)
+                & (self.org_y[lane].abs() <= largest)
+                & (self.org_z[lane].abs() <= largest)
+                & (self.dir_x[lane].abs() <= largest)
+                & (self.dir_y[lane].abs() <= largest)
+                & (self.dir_z[lane].abs() <= largest);
+            let interval = (self.tnear[lane] >= 0.0) & (self.tfar[lane] >= self.tnear[lane]);
+            *valid = -i32::from(within & interval);
+        }
+        valid
     }
 }
 

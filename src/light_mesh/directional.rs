@@ -1,0 +1,75 @@
+//! Irradiance by normal: the directional basis of spec §4 and §5.
+//!
+//! Light of weight 1 from direction ω irradiates a surface of normal n with max(0, n·ω). Cut off after
+//! second-order spherical harmonics (Ramamoorthi and Hanrahan, 2001) this is 1/4 + (n·ω)/2 + 5/32·(3(n·ω)² − 1), a
+//! quadratic polynomial in n. As |n| = 1, its constant can be moved into the squares, which leaves nine
+//! coefficients per colour channel: those of x, y, z, x², y², z², xy, xz, yz.
+
+use glam::Vec3;
+
+/// Coefficients per channel.
+pub const COEFFICIENTS: usize = 9;
+
+/// Numbers kept per mesh point: three channels of coefficients, padded to whole vector registers.
+pub const STRIDE: usize = 32;
+
+/// The coefficients of max(0, n·ω), for n the unit vector ω.
+#[inline(always)]
+pub fn cosine_lobe(w: [f32; 3]) -> [f32; COEFFICIENTS] {
+    let [x, y, z] = w;
+    const SQUARE: f32 = 15.0 / 32.0;
+    const CONSTANT: f32 = 3.0 / 32.0;
+    [
+        0.5 * x,
+        0.5 * y,
+        0.5 * z,
+        SQUARE * x * x + CONSTANT,
+        SQUARE * y * y + CONSTANT,
+        SQUARE * z * z + CONSTANT,
+        2.0 * SQUARE * x * y,
+        2.0 * SQUARE * x * z,
+        2.0 * SQUARE * y * z,
+    ]
+}
+
+/// What the coefficients are multiplied with to get the irradiance of normal n.
+#[inline(always)]
+pub fn monomials(n: Vec3) -> [f32; COEFFICIENTS] {
+    let Vec3 { x, y, z } = n;
+    [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z]
+}
+
+/// Irradiance of normal `n` (unit length) from three channels of coefficients. Second order undershoots for
+/// normals that face away from a single light, so that it is clamped at 0.
+#[inline(always)]
+pub fn irradiance(coefficients: &[f32; STRIDE], n: Vec3) -> Vec3 {
+    let monomials = monomials(n);
+    let mut channels = [0.0f32; 3];
+    for (c, channel) in channels.iter_mut().enumerate() {
+        for (j, monomial) in monomials.iter().enumerate() {
+            *channel += coefficients[c * COEFFICIENTS + j] * monomial;
+        }
+    }
+    Vec3::from_array(channels).max(Vec3::ZERO)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The polynomial is the stated one, and it is within 0.1 of the cosine that it stands for.
+    #[test]
+    fn the_lobe_is_the_second_order_expansion_of_the_cosine() {
+        for i in 0..200 {
+            let (a, b) = (i as f32 * 0.7, i as f32 * 0.31);
+            let w = Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos()).normalize();
+            let n = Vec3::new(b.cos(), (a * 1.7).sin(), a.cos()).normalize();
+            let mut coefficients = [0.0; STRIDE];
+            coefficients[..COEFFICIENTS].copy_from_slice(&cosine_lobe(w.to_array()));
+            let cosine = n.dot(w);
+            let exact = 0.25 + 0.5 * cosine + 5.0 / 32.0 * (3.0 * cosine * cosine - 1.0);
+            assert!((irradiance(&coefficients, n).x - exact.max(0.0)).abs() < 1e-5);
+            assert!((exact - cosine.max(0.0)).abs() < 0.1);
+        }
+    }
+}

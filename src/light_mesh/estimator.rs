@@ -1,0 +1,214 @@
+//! Direct illumination of surface points from the direct light mesh: the estimators of spec §4.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::direct::{Basis, DirectValues};
+use super::directional;
+use super::leaks::{is_inside, keep_visible};
+use super::lights::{LANES, Lanes, LightTable, VisibilityBits};
+use super::neighbours::Neighbours;
+use super::points::{MeshError, MeshPoints};
+use super::store::PointMask;
+use crate::accel::Accel;
+use crate::scene::{Scene, SurfacePoint};
+use crate::settings::{Estimator, Leaks, LightMeshSettings};
+
+/// Direct light mesh: points, their values, and the estimator that reads them.
+pub struct DirectMesh {
+    /// The mesh points.
+    pub points: MeshPoints,
+    values: DirectValues,
+    lights: LightTable,
+    estimator: Estimator,
+    /// Points inside of geometry, by slot; only kept where they are to be invalidated.
+    inside: Vec<bool>,
+}
+
+/// Working memory and counters of one thread while it shades.
+#[derive(Default)]
+pub struct Scratch {
+    pub(super) neighbours: Neighbours,
+    /// D_y: ids, and (slot, weight).
+    pub(super) points: Vec<(u64, (u32, f32))>,
+    /// Occlusion rays traced from surface points to mesh points.
+    pub rays: u64,
+    /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
+    pub fallbacks: u64,
+}
+
+impl Scratch {
+    /// Finds the points of D_y that count for a surface point; all must be known.
+    ///
+    /// `inside` tells by slot which points lie in geometry; `disagree` whether points differ so much that it matters
+    /// which of them the surface point sees.
+    #[inline(always)]
+    pub(super) fn find<A: Accel>(
+        &mut self,
+        accel: &A,
+        mesh: &MeshPoints,
+        surface: &SurfacePoint,
+        inside: &[bool],
+        disagree: impl Fn(&[(u64, (u32, f32))]) -> bool,
+    ) {
+        self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.neighbours));
+        self.points.clear();
+        self.points.extend(self.neighbours.iter().map(|(id, weight)| (id, (mesh.slot(id), weight))));
+        match mesh.leaks() {
+            Leaks::Allow => {}
+            Leaks::Invalidate => {
+                let first = self.points.first().copied();
+                self.points.retain(|&(_, (slot, _))| !inside[slot as usize]);
+                if self.points.is_empty() {
+                    self.points.extend(first);
+                    self.fallbacks += 1;
+                }
+            }
+            Leaks::Visibility => {
+                if disagree(&self.points) {
+                    self.rays += keep_visible(accel, mesh, surface, &mut self.points);
+                }
+            }
+        }
+    }
+}
+
+impl DirectMesh {
+    /// Mesh over a scene, with no point known.
+    pub fn new(scene: &Scene, settings: &LightMeshSettings) -> Result<Self, MeshError> {
+        Ok(Self {
+            inside: Vec::new(),
+            points: MeshPoints::new(scene.bounds(), &settings.points)?,
+            values: DirectValues::default(),
+            lights: LightTable::new(&scene.lights, scene.falloff),
+            estimator: settings.estimator,
+        })
+    }
+
+    /// Evaluates those of the needed points that are unknown; returns the number of occlusion rays.
+    pub fn evaluate<A: Accel>(&mut self, accel: &A, scene: &Scene, needed: &PointMask) -> u64 {
+        let new = self.points.claim(needed);
+        if self.points.leaks() == Leaks::Invalidate {
+            self.inside.par_extend(new.par_iter().map(|&x| is_inside(accel, scene, x)));
+        }
+        self.values.evaluate(accel, &self.lights, Basis::of(self.estimator), &new)
+    }
+
+    /// Whether some light is seen from one of the points and hidden from another. Where there is none, leaving points
+    /// out changes no visibility.
+    #[inline(always)]
+    fn disagree(&self, points: &[(u64, (u32, f32))]) -> bool {
+        let chunks = self.lights.chunks().len();
+        let Some((&(_, (first, _)), rest)) = points.split_first() else { return false };
+        let first = self.values.bits(first, chunks);
+        rest.iter().any(|&(_, (slot, _))| self.values.bits(slot, chunks) != first)
+    }
+
+    /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.
+    #[inline(always)]
+    pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
+        scratch.find(accel, &self.points, surface, &self.inside, |points| self.disagree(points));
+        let slots = &scratch.points[..];
+        let scale = 1.0 / slots.iter().fold(0.0, |total, &(_, (_, weight))| total + weight);
+        match self.estimator {
+            Estimator::PerLight => self.per_light(surface, slots, scale),
+            Estimator::Paper => {
+                let [direct, _] = self.mean_direct_light(slots, scale);
+                direct * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
+            }
+            Estimator::Ratio => {
+                let [direct, unoccluded] = self.mean_direct_light(slots, scale);
+                let ratio = Vec3::select(unoccluded.cmpgt(Vec3::ZERO), direct / unoccluded, Vec3::ZERO);
+                ratio * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
+            }
+            Estimator::Directional => {
+                let mut sums = [0.0f32; directional::STRIDE];
+                for &(_, (slot, weight)) in slots {
+                    for (sum, value) in
+                        sums.iter_mut().zip(self.values.values::<{ directional::STRIDE }>(slot))
+                    {
+                        *sum += weight * value;
+                    }
+                }
+                directional::irradiance(&sums, surface.shading_normal) * scale
+            }
+        }
+    }
+
+    /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
+    #[inline(always)]
+    fn per_light(&self, surface: &SurfacePoint, slots: &[(u64, (u32, f32))], scale: f32) -> Vec3 {
+        let chunks = self.lights.chunks().len();
+        self.lights.illuminate(surface, |chunk| {
+            let (mut all, mut any) = (VisibilityBits::MAX, 0);
+            for &(_, (slot, _)) in slots {
+                let bits = self.values.bits(slot, chunks)[chunk];
+                all &= bits;
+                any |= bits;
+            }
+            // Most chunks are wholly hidden or wholly seen from all of D_y.
+            if any == 0 {
+                return None;
+            }
+            if all == self.lights.chunks()[chunk].used {
+                return Some([1.0; LANES]);
+            }
+            let mut visible: Lanes = [0.0; LANES];
+            for &(_, (slot, weight)) in slots {
+                let bits = self.values.bits(slot, chunks)[chunk];
+                for (lane, sum) in visible.iter_mut().enumerate() {
+                    *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
+                }
+            }
+            Some(visible.map(|sum| sum * scale))
+        })
+    }
+
+    /// What D_y says of the lights: per chunk the lights that all of D_y sees (`seen`), and those on which its
+    /// points disagree (`mixed`).
+    #[inline(always)]
+    pub fn verdict<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut Scratch,
+        seen: &mut [VisibilityBits],
+        mixed: &mut [VisibilityBits],
+    ) {
+        scratch.find(accel, &self.points, surface, &self.inside, |points| self.disagree(points));
+        let chunks = self.lights.chunks().len();
+        seen.fill(VisibilityBits::MAX);
+        mixed.fill(0);
+        for &(_, (slot, _)) in &scratch.points {
+            let bits = self.values.bits(slot, chunks);
+            for ((all, any), bits) in seen.iter_mut().zip(&mut *mixed).zip(bits) {
+                *all &= bits;
+                *any |= bits;
+            }
+        }
+        mixed.iter_mut().zip(seen).for_each(|(any, all)| *any &= !*all);
+    }
+
+    /// Ĩ of eq. (3), and the same mean of the unoccluded field.
+    #[inline(always)]
+    fn mean_direct_light(&self, slots: &[(u64, (u32, f32))], scale: f32) -> [Vec3; 2] {
+        let mut sums = [0.0f32; 6];
+        for &(_, (slot, weight)) in slots {
+            for (sum, value) in sums.iter_mut().zip(self.values.values::<6>(slot)) {
+                *sum += weight * value;
+            }
+        }
+        let [a, b, c, d, e, f] = sums.map(|sum| sum * scale);
+        [Vec3::new(a, b, c), Vec3::new(d, e, f)]
+    }
+
+    /// The lights.
+    pub fn lights(&self) -> &LightTable {
+        &self.lights
+    }
+
+    /// Bytes held by slots and values.
+    pub fn memory_bytes(&self) -> usize {
+        self.points.memory_bytes() + self.values.memory_bytes()
+    }
+}

@@ -1,0 +1,25 @@
+//! Light meshes: lazily evaluated values at mesh points in free space, interpolated at surfaces.
+
+mod direct;
+mod directional;
+mod estimator;
+mod indirect;
+mod lattice;
+mod leaks;
+mod lights;
+mod neighbours;
+mod points;
+mod scattered;
+mod sphere;
+mod store;
+mod tiled;
+
+pub use direct::{Basis, DirectValues};
+pub use estimator::{DirectMesh, Scratch};
+pub use indirect::{IndirectMesh, IndirectRays};
+pub use lattice::Lattice;
+pub use lights::{LANES, LightTable, VisibilityBits, expand_bits};
+pub use neighbours::{Ball, Neighbours};
+pub use points::{MeshError, MeshPoints, PointCounters};
+pub use sphere::SphereStrata;
+pub use store::{NeededPoints, PointMask};

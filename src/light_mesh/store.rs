@@ -1,0 +1,247 @@
+//! Which mesh points are known, and where their values are kept.
+//!
+//! Values lie in arrays indexed by *slots*, in the order of evaluation. The table from points to slots
+//! holds only bricks of 64 points that were touched, so that memory follows use and not the extent of the
+//! point set.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Marks a point that has no value yet: step 1 of the paper's algorithm.
+pub const UNKNOWN: u32 = u32::MAX;
+
+/// Dense tables up to this many bricks (4 bytes each); beyond, a hash map.
+const DENSE_BRICKS: u64 = 1 << 22;
+
+/// Multiplicative hashing of brick numbers, which are well spread already in their low bits.
+#[derive(Default)]
+struct BrickHasher(u64);
+
+impl Hasher for BrickHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u64(u64::from(byte));
+        }
+    }
+    fn write_u64(&mut self, value: u64) {
+        self.0 = (self.0 ^ value).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(26);
+    }
+}
+
+enum Directory {
+    Dense(Vec<u32>),
+    Sparse(HashMap<u64, u32, BuildHasherDefault<BrickHasher>>),
+}
+
+/// From point ids to slots.
+pub struct SlotTable {
+    directory: Directory,
+    bricks: Vec<[u32; 64]>,
+    used: u32,
+}
+
+/// A set of mesh points: bricks with a bit for each of their 64 points, in ascending order of brick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointMask(Vec<(u64, u64)>);
+
+impl PointMask {
+    /// Union of unordered lists of (brick, points of the brick).
+    pub fn union(parts: impl IntoIterator<Item = (u64, u64)>) -> Self {
+        let mut all: Vec<(u64, u64)> = parts.into_iter().collect();
+        all.sort_unstable_by_key(|&(brick, _)| brick);
+        all.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            if same {
+                kept.1 |= next.1;
+            }
+            same
+        });
+        Self(all)
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> u64 {
+        self.0.iter().map(|&(_, mask)| u64::from(mask.count_ones())).sum()
+    }
+
+    /// Ids of the points in ascending order.
+    pub fn ids(&self) -> impl Iterator<Item = u64> + '_ {
+        self.0.iter().flat_map(|&(brick, mask)| {
+            (0..64).filter(move |place| mask >> place & 1 == 1).map(move |place| brick * 64 + place)
+        })
+    }
+}
+
+impl SlotTable {
+    /// Table for a point set of `bricks` bricks, all points unknown.
+    pub fn new(bricks: u64) -> Self {
+        let directory = if bricks <= DENSE_BRICKS {
+            Directory::Dense(vec![UNKNOWN; bricks as usize])
+        } else {
+            Directory::Sparse(HashMap::default())
+        };
+        Self { directory, bricks: Vec::new(), used: 0 }
+    }
+
+    #[inline(always)]
+    fn brick(&self, brick: u64) -> u32 {
+        match &self.directory {
+            Directory::Dense(table) => table[brick as usize],
+            Directory::Sparse(map) => map.get(&brick).copied().unwrap_or(UNKNOWN),
+        }
+    }
+
+    /// Slot of a point, or [`UNKNOWN`].
+    #[inline(always)]
+    pub fn slot(&self, id: u64) -> u32 {
+        match self.brick(id / 64) {
+            UNKNOWN => UNKNOWN,
+            brick => self.bricks[brick as usize][(id % 64) as usize],
+        }
+    }
+
+    /// Gives slots to those points of the set that are unknown; returns their ids, whose slots follow
+    /// each other after those given away before. From here on they count as known.
+    pub fn claim(&mut self, needed: &PointMask) -> Vec<u64> {
+        let mut new = Vec::new();
+        for &(brick, mask) in &needed.0 {
+            let mut entry = self.brick(brick);
+            if entry == UNKNOWN {
+                entry = self.bricks.len() as u32;
+                self.bricks.push([UNKNOWN; 64]);
+                match &mut self.directory {
+                    Directory::Dense(table) => table[brick as usize] = entry,
+                    Directory::Sparse(map) => {
+                        map.insert(brick, entry);
+                    }
+                }
+            }
+            let slots = &mut self.bricks[entry as usize];
+            for (place, slot) in slots.iter_mut().enumerate() {
+                if mask >> place & 1 == 1 && *slot == UNKNOWN {
+                    *slot = self.used;
+                    self.used += 1;
+                    new.push(brick * 64 + place as u64);
+                }
+            }
+        }
+        new
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let directory = match &self.directory {
+            Directory::Dense(table) => table.capacity() * 4,
+            Directory::Sparse(map) => map.capacity() * 17,
+        };
+        directory + self.bricks.capacity() * 256
+    }
+}
+
+/// Collects the points that one tile needs, before the tiles' lists are united.
+///
+/// A small open-addressed table from bricks to masks: a tile touches tens of bricks thousands of times.
+pub struct NeededPoints {
+    entries: Vec<(u64, u64)>,
+    filled: usize,
+    last: usize,
+}
+
+impl Default for NeededPoints {
+    fn default() -> Self {
+        Self { entries: vec![(u64::MAX, 0); 256], filled: 0, last: 0 }
+    }
+}
+
+impl NeededPoints {
+    /// Adds a point.
+    #[inline(always)]
+    pub fn insert(&mut self, id: u64) {
+        let brick = id / 64;
+        let bit = 1 << (id % 64);
+        if self.entries[self.last].0 == brick {
+            self.entries[self.last].1 |= bit;
+        } else {
+            self.insert_brick(brick, bit);
+        }
+    }
+
+    fn insert_brick(&mut self, brick: u64, mask: u64) {
+        let size = self.entries.len();
+        let mut at = (brick.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & (size - 1);
+        loop {
+            let entry = &mut self.entries[at];
+            if entry.0 == brick {
+                entry.1 |= mask;
+                self.last = at;
+                return;
+            }
+            if entry.0 == u64::MAX {
+                break;
+            }
+            at = (at + 1) & (size - 1);
+        }
+        if self.filled * 2 >= size {
+            let old = std::mem::replace(&mut self.entries, vec![(u64::MAX, 0); size * 2]);
+            self.filled = 0;
+            for (brick, mask) in old {
+                if brick != u64::MAX {
+                    self.insert_brick(brick, mask);
+                }
+            }
+            return self.insert_brick(brick, mask);
+        }
+        self.entries[at] = (brick, mask);
+        self.filled += 1;
+        self.last = at;
+    }
+
+    /// Bricks and the masks of their needed points, in no particular order.
+    pub fn into_bricks(self) -> impl Iterator<Item = (u64, u64)> {
+        self.entries.into_iter().filter(|&(brick, _)| brick != u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A known point is never given a second slot: "evaluated at most once" rests on this.
+    #[test]
+    fn a_point_is_claimed_once() {
+        for bricks in [1000, DENSE_BRICKS + 1] {
+            let mut table = SlotTable::new(bricks);
+            let first = PointMask::union([(3, 0b101), (900, 1 << 63), (3, 0b1)]);
+            assert_eq!(table.claim(&first), [192, 194, 900 * 64 + 63]);
+            let second = PointMask::union([(900, 3 << 62), (3, 0b111)]);
+            assert_eq!(table.claim(&second), [193, 900 * 64 + 62]);
+            assert_eq!(table.claim(&second), [] as [u64; 0]);
+            assert_eq!(table.slot(194), 1);
+            assert_eq!(table.slot(193), 3);
+            assert_eq!(table.slot(195), UNKNOWN);
+            assert_eq!(table.slot(64), UNKNOWN);
+        }
+    }
+
+    /// The tile's table loses nothing when it grows.
+    #[test]
+    fn needed_points_survive_growth() {
+        let mut needed = NeededPoints::default();
+        for i in 0..5000u64 {
+            needed.insert(i * 64 * 37 + i % 64);
+            needed.insert(i * 64 * 37 + (i + 5) % 64);
+        }
+        let mask = PointMask::union(needed.into_bricks());
+        assert_eq!(mask.len(), 10_000);
+        let expected: Vec<u64> = (0..5000u64)
+            .flat_map(|i| {
+                let (a, b) = (i % 64, (i + 5) % 64);
+                [i * 64 * 37 + a.min(b), i * 64 * 37 + a.max(b)]
+            })
+            .collect();
+        assert_eq!(mask.ids().collect::<Vec<_>>(), expected);
+    }
+}

@@ -1,0 +1,87 @@
+//! How the image is cut up: tiles for the threads, blocks of tiles for the memory.
+
+/// Edge of a tile in pixels. Tiles lie on a fixed raster, so that neither the number of threads nor the
+/// block size changes which rays travel together.
+pub const TILE: u32 = 32;
+
+/// Edge of the squares of pixels whose rays form one packet of 16.
+const SQUARE: u32 = 4;
+
+/// A rectangle of at most [`TILE`]×[`TILE`] pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// Left column.
+    pub x: u32,
+    /// Top row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Tile {
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        (self.width * self.height) as usize
+    }
+
+    /// Squares of up to 4×4 pixels, row by row: for each pixel its column, row, and index within the tile.
+    pub fn squares(&self) -> impl Iterator<Item = impl Iterator<Item = (u32, u32, u32)> + '_> + '_ {
+        let steps = |length: u32| (0..length).step_by(SQUARE as usize);
+        steps(self.height).flat_map(move |top| {
+            steps(self.width).map(move |left| {
+                (top..(top + SQUARE).min(self.height)).flat_map(move |y| {
+                    (left..(left + SQUARE).min(self.width))
+                        .map(move |x| (self.x + x, self.y + y, y * self.width + x))
+                })
+            })
+        })
+    }
+}
+
+/// The tiles of an image, in blocks of at most `block_pixels` pixels each (at least one tile).
+pub fn blocks(resolution: (u32, u32), block_pixels: u64) -> Vec<Vec<Tile>> {
+    let (width, height) = resolution;
+    let mut blocks: Vec<Vec<Tile>> = Vec::new();
+    let mut pixels = u64::MAX;
+    for y in (0..height).step_by(TILE as usize) {
+        for x in (0..width).step_by(TILE as usize) {
+            let tile = Tile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
+            let size = tile.pixels() as u64;
+            match blocks.last_mut() {
+                Some(block) if pixels + size <= block_pixels => {
+                    block.push(tile);
+                    pixels += size;
+                }
+                _ => {
+                    blocks.push(vec![tile]);
+                    pixels = size;
+                }
+            }
+        }
+    }
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pixel belongs to exactly one square of one tile of one block.
+    #[test]
+    fn tiles_cover_the_image_once() {
+        let (width, height) = (101, 67);
+        for block_pixels in [1, 3000, u64::MAX] {
+            let mut seen = vec![0; (width * height) as usize];
+            for tile in blocks((width, height), block_pixels).iter().flatten() {
+                let mut inside = vec![false; tile.pixels()];
+                for (x, y, index) in tile.squares().flatten() {
+                    seen[(y * width + x) as usize] += 1;
+                    assert!(!std::mem::replace(&mut inside[index as usize], true));
+                }
+            }
+            assert!(seen.iter().all(|&count| count == 1));
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Surface points: what a ray found, with everything that shading needs.
+
+use glam::{Mat3A, Vec3, Vec3A};
+
+use super::Scene;
+use crate::accel::Hit;
+
+/// A visible surface point y (spec §1) with its material evaluated.
+///
+/// Both normals are unit length and face the side from which the point was seen (spec §7).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// y in world space, on the triangle to within rounding.
+    pub position: Vec3,
+    /// How far rays that leave y must start from it along the geometric normal so that rounding can't
+    /// put them behind the triangle; scene units.
+    pub offset: f32,
+    /// Normal of the triangle; it decides sides.
+    pub geometric_normal: Vec3,
+    /// Interpolated vertex normal, or the geometric one; it turns the cosines only.
+    pub shading_normal: Vec3,
+    /// k_d.
+    pub diffuse: Vec3,
+    /// k_s.
+    pub specular: Vec3,
+    /// Emiss towards the side that was seen.
+    pub emission: Vec3,
+    /// Whether the front of the triangle (counter-clockwise winding) was seen.
+    pub front: bool,
+    /// Whether both sides of the material are alike.
+    pub two_sided: bool,
+    /// Whether rays of sight pass through this side (a culled back face).
+    pub culled: bool,
+}
+
+impl SurfacePoint {
+    /// Start of rays that leave the point on the side from which it was seen.
+    #[inline(always)]
+    pub fn ray_origin(&self) -> Vec3 {
+        self.position + self.geometric_normal * self.offset
+    }
+
+    /// Whether it is the back of a one-sided surface.
+    pub fn shows_back(&self) -> bool {
+        !self.front && !self.two_sided
+    }
+}
+
+/// Rounding of a coordinate of size c is about ε·c; interpolation of three vertices, the instance transform and
+/// the ray–triangle test of the next ray each add a few of those. 32 covers their sum with room to spare, and
+/// is still below 1/250,000 of the coordinates' size.
+const OFFSET_FACTOR: f32 = 32.0 * f32::EPSILON;
+
+impl Scene {
+    /// The surface point of a hit, seen along `direction` (any length).
+    pub fn surface_point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
+        let instance = &self.instances[hit.instance as usize];
+        let mesh = &*self.meshes[instance.mesh as usize];
+        let corners = mesh.corners(hit.triangle);
+        let (u, v) = (hit.u, hit.v);
+        let w = 1.0 - u - v;
+
+        let mut position = corners[0] * w + corners[1] * u + corners[2] * v;
+        let edges = [corners[1] - corners[0], corners[2] - corners[0]];
+        // The next ray's test measures its distance to the plane from the vertices, so that the
+        // rounding grows with the triangle as well as with the coordinates.
+        let mut extent = edges[0].abs().max_element().max(edges[1].abs().max_element());
+        let mut normal = edges[0].cross(edges[1]);
+        let mut shading = mesh.normals.as_ref().map(|normals| {
+            let [a, b, c] =
+                mesh.triangles[hit.triangle as usize].map(|i| Vec3::from_array(normals[i as usize]));
+            a * w + b * u + c * v
+        });
+        if let Some(to_world) = &instance.to_world {
+            extent = (extent + position.abs().max_element()) * max_scale(&to_world.matrix3);
+            position = to_world.transform_point3(position);
+            extent += to_world.translation.abs().max_element();
+            // The cofactor matrix carries normals, keeps their side under mirroring up to the sign of
+            // the determinant, and exists for singular transforms.
+            let cofactors = cofactors(&to_world.matrix3);
+            let mirrored = to_world.matrix3.determinant() < 0.0;
+            let carry = |n: Vec3| {
+                let n = Vec3::from(cofactors * Vec3A::from(n));
+                if mirrored { -n } else { n }
+            };
+            normal = carry(normal);
+            shading = shading.map(carry);
+            // Counter-clockwise order is judged in object space: a mirrored instance keeps its front.
+        }
+
+        let normal = normal.normalize_or(-direction.normalize_or(Vec3::Z));
+        let front = normal.dot(direction) <= 0.0;
+        let geometric_normal = if front { normal } else { -normal };
+        let shading_normal = shading.and_then(Vec3::try_normalize).map_or(geometric_normal, |n| {
+            // Vertex normals may be wound against the triangle; what counts is the side seen.
+            if n.dot(geometric_normal) < 0.0 { -n } else { n }
+        });
+
+        let material = &self.materials[mesh.materials.of(hit.triangle) as usize];
+        let mut diffuse = material.diffuse;
+        if let Some(colors) = &mesh.colors {
+            let [a, b, c] =
+                mesh.triangles[hit.triangle as usize].map(|i| Vec3::from_array(colors[i as usize]));
+            diffuse *= a * w + b * u + c * v;
+        }
+        SurfacePoint {
+            position,
+            offset: OFFSET_FACTOR * (position.abs().max_element() + extent),
+            geometric_normal,
+            shading_normal,
+            diffuse,
+            specular: material.specular,
+            emission: if front || material.two_sided { material.emission } else { Vec3::ZERO },
+            front,
+            two_sided: material.two_sided,
+            culled: !front && material.cull && !material.two_sided,
+        }
+    }
+}
+
+/// Upper bound of how much a matrix stretches a vector's largest component.
+fn max_scale(matrix: &Mat3A) -> f32 {
+    let sum = matrix.x_axis.abs() + matrix.y_axis.abs() + matrix.z_axis.abs();
+    sum.max_element()
+}
+
+/// Cofactor matrix: the inverse transpose times the determinant.
+fn cofactors(m: &Mat3A) -> Mat3A {
+    Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Instance, Material, Positions, TriangleMaterials, TriangleMesh};
+    use glam::Affine3A;
+    use std::sync::Arc;
+
+    fn triangle(to_world: Option<Affine3A>) -> Scene {
+        Scene {
+            meshes: vec![Arc::new(TriangleMesh {
+                name: String::new(),
+                positions: Positions::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+                triangles: Arc::new(vec![[0, 1, 2]]),
+                normals: None,
+                uvs: None,
+                colors: None,
+                materials: TriangleMaterials::Uniform(0),
+                cutout: None,
+            })],
+            instances: vec![Instance { mesh: 0, to_world }],
+            materials: vec![Material { emission: Vec3::ONE, ..Material::default() }],
+            ..Scene::default()
+        }
+    }
+
+    const HIT: Hit = Hit { t: 1.0, u: 0.25, v: 0.5, instance: 0, triangle: 0 };
+
+    /// Counter-clockwise winding seen from +z is the front: the normal faces the viewer and it emits.
+    #[test]
+    fn the_front_is_the_counter_clockwise_side() {
+        let scene = triangle(None);
+        let front = scene.surface_point(&HIT, Vec3::NEG_Z);
+        assert!(front.front);
+        assert_eq!(front.geometric_normal, Vec3::Z);
+        assert_eq!(front.emission, Vec3::ONE);
+        assert_eq!(front.position, Vec3::new(0.25, 0.5, 0.0));
+        let back = scene.surface_point(&HIT, Vec3::Z);
+        assert!(!back.front);
+        assert_eq!(back.geometric_normal, Vec3::NEG_Z);
+        assert_eq!(back.emission, Vec3::ZERO);
+    }
+
+    /// A mirrored instance keeps its material on the same side: its front is the image of the front.
+    #[test]
+    fn mirroring_carries_the_front_along() {
+        let mirror = triangle(Some(Affine3A::from_scale(Vec3::new(1.0, 1.0, -1.0))));
+        // The front pointed to +z; its mirror image points to −z.
+        assert!(mirror.surface_point(&HIT, Vec3::Z).front);
+        let flipped_x = triangle(Some(Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0))));
+        // Mirrored in x, the image of the +z normal is still +z.
+        assert!(flipped_x.surface_point(&HIT, Vec3::NEG_Z).front);
+    }
+}

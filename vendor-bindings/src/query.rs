@@ -1,0 +1,291 @@
+//! Ray queries against a committed scene. None of them can fail or allocate.
+//!
+//! Rays that are none hit nothing: a component of origin or direction that is NaN or larger than
+//! [`Scene::largest_coordinate`], or an interval without 0 ≤ tnear ≤ tfar. They are kept from Embree,
+//! whose Debian builds have assertions on and abort on them.
+
+use std::ptr;
+
+use crate::bindings::{embree3 as v3, embree4 as v4};
+use crate::library::Api;
+use crate::packet::{INVALID_ID, RayHitPacket, RayPacket};
+use crate::scene::Scene;
+
+/// A ray `origin + t * direction` for `tnear <= t <= tfar`; the direction need not be normalised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Start point.
+    pub origin: [f32; 3],
+    /// Direction; t is in units of its length.
+    pub direction: [f32; 3],
+    /// Start of the valid interval, ≥ 0.
+    pub tnear: f32,
+    /// End of the valid interval.
+    pub tfar: f32,
+}
+
+impl Ray {
+    /// As [`RayPacket::valid_lanes`].
+    #[inline(always)]
+    fn is_valid(&self, largest: f32) -> bool {
+        let within = |v: &[f32; 3]| v.iter().all(|x| x.abs() <= largest);
+        within(&self.origin) && within(&self.direction) && self.tnear >= 0.0 && self.tfar >= self.tnear
+    }
+}
+
+/// Nearest hit of a single ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Barycentric coordinate of the triangle's second vertex.
+    pub u: f32,
+    /// Barycentric coordinate of the triangle's third vertex.
+    pub v: f32,
+    /// Triangle within the geometry.
+    pub prim_id: u32,
+    /// Geometry within the scene, or within the instanced scene.
+    pub geom_id: u32,
+    /// Instance within the scene, [`INVALID_ID`] for geometry that is not instanced.
+    pub inst_id: u32,
+}
+
+/// Per-lane flags as Embree wants them: −1 or 0, aligned for the widest packets.
+#[repr(align(64))]
+struct Valid([i32; 16]);
+
+/// Flags of four lanes by their bits, so that a mask expands in four loads.
+const FOUR_LANES: [[i32; 4]; 16] = {
+    let mut table = [[0; 4]; 16];
+    let mut bits = 0;
+    while bits < 16 {
+        let mut lane = 0;
+        while lane < 4 {
+            table[bits][lane] = -((bits as i32 >> lane) & 1);
+            lane += 1;
+        }
+        bits += 1;
+    }
+    table
+};
+
+impl Valid {
+    /// The active lanes whose rays Embree takes.
+    #[inline(always)]
+    fn new<const N: usize>(active: u32, rays: &RayPacket<N>, largest: f32) -> Self {
+        let mut valid = Self([0; 16]);
+        let usable = rays.valid_lanes(largest);
+        for (quad, (lanes, usable)) in valid.0.chunks_exact_mut(4).zip(usable.chunks_exact(4)).enumerate() {
+            let wanted = FOUR_LANES[(active >> (4 * quad)) as usize & 15];
+            for ((lane, usable), wanted) in lanes.iter_mut().zip(usable).zip(wanted) {
+                *lane = usable & wanted;
+            }
+        }
+        valid
+    }
+}
+
+/// Valid lanes whose `tfar` is −∞: what an occlusion query makes of a blocked ray, and what no valid
+/// ray comes with.
+#[inline(always)]
+fn blocked<const N: usize>(valid: &Valid, tfar: &[f32; N]) -> u32 {
+    let mut mask = 0;
+    for (lane, (valid, t)) in valid.0.iter().zip(tfar).enumerate() {
+        mask |= (u32::from(*t == f32::NEG_INFINITY) & *valid as u32 & 1) << lane;
+    }
+    mask
+}
+
+#[inline(always)]
+fn context3(coherent: bool) -> v3::RTCIntersectContext {
+    let flags = if coherent {
+        v3::RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+    } else {
+        v3::RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
+    };
+    v3::RTCIntersectContext { flags, filter: None, instID: [INVALID_ID] }
+}
+
+#[inline(always)]
+fn flags4(coherent: bool) -> v4::RTCRayQueryFlags {
+    if coherent { v4::RTC_RAY_QUERY_FLAG_COHERENT } else { v4::RTC_RAY_QUERY_FLAG_INCOHERENT }
+}
+
+#[inline(always)]
+fn intersect4(coherent: bool) -> v4::RTCIntersectArguments {
+    v4::RTCIntersectArguments {
+        flags: flags4(coherent),
+        feature_mask: v4::RTC_FEATURE_FLAG_ALL,
+        context: ptr::null_mut(),
+        filter: None,
+        intersect: None,
+    }
+}
+
+#[inline(always)]
+fn occluded4(coherent: bool) -> v4::RTCOccludedArguments {
+    v4::RTCOccludedArguments {
+        flags: flags4(coherent),
+        feature_mask: v4::RTC_FEATURE_FLAG_ALL,
+        context: ptr::null_mut(),
+        filter: None,
+        occluded: None,
+    }
+}
+
+#[inline(always)]
+fn raw_ray(ray: &Ray) -> v4::RTCRay {
+    let ([org_x, org_y, org_z], [dir_x, dir_y, dir_z]) = (ray.origin, ray.direction);
+    v4::RTCRay {
+        org_x,
+        org_y,
+        org_z,
+        tnear: ray.tnear,
+        dir_x,
+        dir_y,
+        dir_z,
+        time: 0.0,
+        tfar: ray.tfar,
+        mask: u32::MAX,
+        id: 0,
+        flags: 0,
+    }
+}
+
+impl Scene {
+    /// Nearest hit of one ray.
+    #[inline]
+    pub fn intersect1(&self, ray: &Ray) -> Option<Hit> {
+        if !ray.is_valid(self.largest_coordinate()) {
+            return None;
+        }
+        let mut r = v4::RTCRayHit {
+            ray: raw_ray(ray),
+            hit: v4::RTCHit {
+                Ng_x: 0.0,
+                Ng_y: 0.0,
+                Ng_z: 0.0,
+                u: 0.0,
+                v: 0.0,
+                primID: INVALID_ID,
+                geomID: INVALID_ID,
+                instID: [INVALID_ID],
+                instPrimID: [INVALID_ID],
+            },
+        };
+        // SAFETY: the scene is committed; the struct is version 4's, of which version 3's is a prefix
+        // (see `layout`); the context is initialised.
+        unsafe {
+            match self.api() {
+                Api::V3(embree) => {
+                    let mut context = context3(false);
+                    (embree.rtcIntersect1)(self.handle(), &mut context, (&raw mut r).cast());
+                }
+                Api::V4(embree) => (embree.rtcIntersect1)(self.handle(), &mut r, ptr::null_mut()),
+            }
+        }
+        (r.hit.geomID != INVALID_ID).then(|| Hit {
+            t: r.ray.tfar,
+            u: r.hit.u,
+            v: r.hit.v,
+            prim_id: r.hit.primID,
+            geom_id: r.hit.geomID,
+            inst_id: r.hit.instID[0],
+        })
+    }
+
+    /// Whether anything lies on one ray.
+    #[inline]
+    pub fn occluded1(&self, ray: &Ray) -> bool {
+        if !ray.is_valid(self.largest_coordinate()) {
+            return false;
+        }
+        let mut r = raw_ray(ray);
+        // SAFETY: as in `intersect1`.
+        unsafe {
+            match self.api() {
+                Api::V3(embree) => {
+                    let mut context = context3(false);
+                    (embree.rtcOccluded1)(self.handle(), &mut context, (&raw mut r).cast());
+                }
+                Api::V4(embree) => (embree.rtcOccluded1)(self.handle(), &mut r, ptr::null_mut()),
+            }
+        }
+        r.tfar == f32::NEG_INFINITY
+    }
+
+    /// Nearest hits of the lanes whose bit is set in `active`; `N` is 4, 8 or 16.
+    ///
+    /// Lanes that hit get `ray.tfar` and `hit` filled; all others stay as they are, so `geom_id` and
+    /// `inst_id` should come as [`INVALID_ID`]. `coherent` is a hint for rays with neighbouring origins
+    /// and directions, and changes no answer.
+    #[inline]
+    pub fn intersect_packet<const N: usize>(
+        &self,
+        active: u32,
+        packet: &mut RayHitPacket<N>,
+        coherent: bool,
+    ) {
+        const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
+        let lanes = Valid::new(active, &packet.ray, self.largest_coordinate());
+        let (valid, scene, packet) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
+        // SAFETY: the scene is committed; flags and packet are aligned and of the layout of N lanes
+        // (see `layout`); the packet is borrowed mutably.
+        unsafe {
+            match self.api() {
+                Api::V3(embree) => {
+                    let mut context = context3(coherent);
+                    match N {
+                        4 => (embree.rtcIntersect4)(valid, scene, &mut context, packet.cast()),
+                        8 => (embree.rtcIntersect8)(valid, scene, &mut context, packet.cast()),
+                        _ => (embree.rtcIntersect16)(valid, scene, &mut context, packet.cast()),
+                    }
+                }
+                Api::V4(embree) => {
+                    let mut arguments = intersect4(coherent);
+                    match N {
+                        4 => (embree.rtcIntersect4)(valid, scene, packet.cast(), &mut arguments),
+                        8 => (embree.rtcIntersect8)(valid, scene, packet.cast(), &mut arguments),
+                        _ => (embree.rtcIntersect16)(valid, scene, packet.cast(), &mut arguments),
+                    }
+                }
+            }
+        }
+    }
+
+    /// The lanes of `active` that are blocked; `N` is 4, 8 or 16. Blocked lanes have their `tfar` set
+    /// to −∞, all others stay as they are.
+    #[inline]
+    pub fn occluded_packet<const N: usize>(
+        &self,
+        active: u32,
+        packet: &mut RayPacket<N>,
+        coherent: bool,
+    ) -> u32 {
+        const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
+        let lanes = Valid::new(active, packet, self.largest_coordinate());
+        let (valid, scene, rays) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
+        // SAFETY: as in `intersect_packet`.
+        unsafe {
+            match self.api() {
+                Api::V3(embree) => {
+                    let mut context = context3(coherent);
+                    match N {
+                        4 => (embree.rtcOccluded4)(valid, scene, &mut context, rays.cast()),
+                        8 => (embree.rtcOccluded8)(valid, scene, &mut context, rays.cast()),
+                        _ => (embree.rtcOccluded16)(valid, scene, &mut context, rays.cast()),
+                    }
+                }
+                Api::V4(embree) => {
+                    let mut arguments = occluded4(coherent);
+                    match N {
+                        4 => (embree.rtcOccluded4)(valid, scene, rays.cast(), &mut arguments),
+                        8 => (embree.rtcOccluded8)(valid, scene, rays.cast(), &mut arguments),
+                        _ => (embree.rtcOccluded16)(valid, scene, rays.cast(), &mut arguments),
+                    }
+                }
+            }
+        }
+        blocked(&lanes, &packet.tfar)
+    }
+}
