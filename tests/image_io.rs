@@ -1,5 +1,7 @@
 //! Pictures survive the way to disk and back, and files of others are read for what they mean.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
+
 use exr::image::{AnyChannel as Channel, write::layers::WritableLayers};
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::LayerAttributes;
@@ -243,7 +245,7 @@ fn png_of_every_colour_type_is_read() {
     assert!((half - 0.5029).abs() < 1e-4, "{half}");
 }
 
-/// A writer must say the same in the same words, or a stored checksum of a picture is worth nothing.
+/// Blocks are compressed in parallel, which must not show in the file.
 #[test]
 fn the_same_picture_gives_the_same_bytes() {
     let picture = eighths(64, 48);

@@ -42,7 +42,7 @@ pub enum SampleType {
 
 /// Encodes `image` as one layer with the channels R, G, B, compressed with ZIP in blocks of 16 rows.
 ///
-/// `metadata` becomes string attributes of these names.
+/// `metadata` becomes string attributes of these names, in no particular order.
 ///
 /// # Errors
 ///

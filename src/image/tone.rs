@@ -5,8 +5,7 @@
 
 /// Encodes linear light in [0, 1] with the sRGB transfer function; values outside are clamped, NaN becomes 0.
 pub fn srgb_from_linear(linear: f32) -> f32 {
-    // `max` before `min`: f32::max returns the other operand for a NaN.
-    let linear = linear.max(0.0).min(1.0);
+    let linear = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
