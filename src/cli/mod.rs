@@ -1,6 +1,8 @@
 //! The program's command line: one file per subcommand.
 
 pub mod compare;
+pub mod gallery;
+mod gallery_page;
 pub mod generate;
 mod progress;
 pub mod render;
@@ -25,6 +27,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Write a procedural scene.
     Generate(generate::GenerateArgs),
+    /// Render the scenes of a list and write a page about them.
+    Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArgs),
 }
@@ -48,6 +52,7 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args).map_err(anything),
         Command::Generate(args) => generate::run(args).map_err(anything),
+        Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {
             Ok(compare::Verdict::Passed) => Ok(()),
             Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,
