@@ -266,7 +266,7 @@ fn needed_by(paths: &[TilePaths], points: &MeshPoints) -> Vec<(u64, u64)> {
                 let mut neighbours = Neighbours::default();
                 for vertex in &tile.vertices {
                     points.neighbours(&vertex.surface, &mut neighbours);
-                    neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                    neighbours.ids().iter().for_each(|&id| needed.insert(id));
                 }
                 needed.into_bricks().collect()
             })
