@@ -1,6 +1,8 @@
 //! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
 
 pub mod accel;
+pub mod cli;
+pub mod image;
 pub mod light_mesh;
 pub mod render;
 pub mod scene;

@@ -3,7 +3,11 @@
 //! Plain values, checked where they are read (scene file or command line); the rest of the library
 //! relies on the ranges stated here.
 
+use std::sync::Arc;
+
 use glam::Vec3;
+
+use crate::scene::Bounds;
 
 /// Settings of one render.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +86,8 @@ impl Default for LightMeshSettings {
 /// Where mesh points lie, and which of them a surface point takes (spec §3, §8).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointSettings {
+    /// How the points are laid out.
+    pub layout: PointLayout,
     /// Distance between neighbouring mesh points.
     pub spacing: Spacing,
     /// Radius R of D_y.
@@ -90,15 +96,22 @@ pub struct PointSettings {
     pub neighbourhood: Neighbourhood,
     /// Drop points of D_y behind the tangent plane at y.
     pub hemisphere: bool,
+    /// What keeps light from leaking through walls.
+    pub leaks: Leaks,
+    /// Boxes with a spacing and radius of their own; where they overlap, the last one holds.
+    pub regions: Vec<Region>,
 }
 
 impl Default for PointSettings {
     fn default() -> Self {
         Self {
+            layout: PointLayout::Regular,
             spacing: Spacing::Auto,
             radius: Radius::Spacings(2.0),
             neighbourhood: Neighbourhood::SmoothSphere,
             hemisphere: true,
+            leaks: Leaks::Visibility,
+            regions: Vec::new(),
         }
     }
 }
@@ -149,6 +162,49 @@ pub enum Normalization {
     Mean,
     /// The integral as printed.
     Integral,
+}
+
+/// Layout of mesh points (spec §8).
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointLayout {
+    /// Regular grid: the paper's.
+    Regular,
+    /// Corners and centres of cubes whose edge is the spacing.
+    BodyCentred,
+    /// One point anywhere in each cube of a regular grid.
+    Jittered {
+        /// Seed of the jitter.
+        seed: u64,
+    },
+    /// As dense as the regular grid, without its rows.
+    BlueNoise {
+        /// Seed of the layout.
+        seed: u64,
+    },
+    /// Given positions, at least one; there is no spacing.
+    List(Arc<Vec<Vec3>>),
+}
+
+/// Box within which spacing and radius differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// The box, world space.
+    pub bounds: Bounds,
+    /// Spacing there; `None` for that of the whole.
+    pub spacing: Option<Vec3>,
+    /// R there, scene units; `None` for what the radius setting gives with the region's spacing.
+    pub radius: Option<f32>,
+}
+
+/// What keeps light from leaking through walls, and darkness out of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leaks {
+    /// Nothing: all points of D_y count.
+    Allow,
+    /// Points that see mostly back faces of one-sided surfaces lie inside of something and don't count.
+    Invalidate,
+    /// Where the points of D_y disagree, only those count that the surface point sees.
+    Visibility,
 }
 
 /// Distance between neighbouring mesh points.

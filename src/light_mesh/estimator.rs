@@ -1,16 +1,18 @@
 //! Direct illumination of surface points from the direct light mesh: the estimators of spec §4.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::direct::{Basis, DirectValues};
 use super::directional;
+use super::leaks::{is_inside, keep_visible};
 use super::lights::{LANES, Lanes, LightTable, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::store::PointMask;
 use crate::accel::Accel;
 use crate::scene::{Scene, SurfacePoint};
-use crate::settings::{Estimator, LightMeshSettings};
+use crate::settings::{Estimator, Leaks, LightMeshSettings};
 
 /// Direct light mesh: points, their values, and the estimator that reads them.
 pub struct DirectMesh {
@@ -19,19 +21,61 @@ pub struct DirectMesh {
     values: DirectValues,
     lights: LightTable,
     estimator: Estimator,
+    /// Points inside of geometry, by slot; only kept where they are to be invalidated.
+    inside: Vec<bool>,
 }
 
-/// Working memory of one thread while it shades.
+/// Working memory and counters of one thread while it shades.
 #[derive(Default)]
 pub struct Scratch {
-    pub(super) neighbours: Neighbours,
-    slots: Vec<(u32, f32)>,
+    /// D_y.
+    pub(super) points: Neighbours,
+    /// Occlusion rays traced from surface points to mesh points.
+    pub rays: u64,
+    /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
+    pub fallbacks: u64,
+}
+
+impl Scratch {
+    /// Finds the points of D_y that count for a surface point; all must be known.
+    ///
+    /// `inside` tells by slot which points lie in geometry; `disagree` whether points differ so much that it matters
+    /// which of them the surface point sees.
+    #[inline(always)]
+    pub(super) fn find<A: Accel>(
+        &mut self,
+        accel: &A,
+        mesh: &MeshPoints,
+        surface: &SurfacePoint,
+        inside: &[bool],
+        disagree: impl Fn(&[u32]) -> bool,
+    ) {
+        self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.points));
+        self.points.find_slots(|id| mesh.slot(id));
+        match mesh.leaks() {
+            Leaks::Allow => {}
+            Leaks::Invalidate => {
+                if self.points.slots().iter().any(|&slot| inside[slot as usize])
+                    && !self.points.keep(|_, slot| !inside[slot as usize])
+                {
+                    self.points.keep_first();
+                    self.fallbacks += 1;
+                }
+            }
+            Leaks::Visibility => {
+                if disagree(self.points.slots()) {
+                    self.rays += keep_visible(accel, mesh, surface, &mut self.points);
+                }
+            }
+        }
+    }
 }
 
 impl DirectMesh {
     /// Mesh over a scene, with no point known.
     pub fn new(scene: &Scene, settings: &LightMeshSettings) -> Result<Self, MeshError> {
         Ok(Self {
+            inside: Vec::new(),
             points: MeshPoints::new(scene.bounds(), &settings.points)?,
             values: DirectValues::default(),
             lights: LightTable::new(&scene.lights, scene.falloff),
@@ -40,37 +84,44 @@ impl DirectMesh {
     }
 
     /// Evaluates those of the needed points that are unknown; returns the number of occlusion rays.
-    pub fn evaluate<A: Accel>(&mut self, accel: &A, needed: &PointMask) -> u64 {
+    pub fn evaluate<A: Accel>(&mut self, accel: &A, scene: &Scene, needed: &PointMask) -> u64 {
         let new = self.points.claim(needed);
+        if self.points.leaks() == Leaks::Invalidate {
+            self.inside.par_extend(new.par_iter().map(|&x| is_inside(accel, scene, x)));
+        }
         self.values.evaluate(accel, &self.lights, Basis::of(self.estimator), &new)
+    }
+
+    /// Whether some light is seen from one of the points and hidden from another. Where there is none, leaving points
+    /// out changes no visibility.
+    #[inline(always)]
+    fn disagree(&self, slots: &[u32]) -> bool {
+        let chunks = self.lights.chunks().len();
+        let Some((&first, rest)) = slots.split_first() else { return false };
+        let first = self.values.bits(first, chunks);
+        rest.iter().any(|&slot| self.values.bits(slot, chunks) != first)
     }
 
     /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.
     #[inline(always)]
-    pub fn illumination(&self, surface: &SurfacePoint, scratch: &mut Scratch) -> (Vec3, bool) {
-        let fallback = self.points.neighbours(surface, &mut scratch.neighbours);
-        scratch.slots.clear();
-        let mut total = 0.0;
-        for (id, weight) in scratch.neighbours.iter() {
-            total += weight;
-            scratch.slots.push((self.points.slot(id), weight));
-        }
-        let slots = &scratch.slots[..];
-        let scale = 1.0 / total;
-        let illumination = match self.estimator {
-            Estimator::PerLight => self.per_light(surface, slots, scale),
+    pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
+        let points = &scratch.points;
+        let scale = 1.0 / points.total_weight();
+        match self.estimator {
+            Estimator::PerLight => self.per_light(surface, points, scale),
             Estimator::Paper => {
-                let [direct, _] = self.mean_direct_light(slots, scale);
+                let [direct, _] = self.mean_direct_light(points, scale);
                 direct * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Ratio => {
-                let [direct, unoccluded] = self.mean_direct_light(slots, scale);
+                let [direct, unoccluded] = self.mean_direct_light(points, scale);
                 let ratio = Vec3::select(unoccluded.cmpgt(Vec3::ZERO), direct / unoccluded, Vec3::ZERO);
                 ratio * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Directional => {
                 let mut sums = [0.0f32; directional::STRIDE];
-                for &(slot, weight) in slots {
+                for (slot, weight) in points.iter() {
                     for (sum, value) in
                         sums.iter_mut().zip(self.values.values::<{ directional::STRIDE }>(slot))
                     {
@@ -79,17 +130,16 @@ impl DirectMesh {
                 }
                 directional::irradiance(&sums, surface.shading_normal) * scale
             }
-        };
-        (illumination, fallback)
+        }
     }
 
     /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
     #[inline(always)]
-    fn per_light(&self, surface: &SurfacePoint, slots: &[(u32, f32)], scale: f32) -> Vec3 {
+    fn per_light(&self, surface: &SurfacePoint, points: &Neighbours, scale: f32) -> Vec3 {
         let chunks = self.lights.chunks().len();
         self.lights.illuminate(surface, |chunk| {
             let (mut all, mut any) = (VisibilityBits::MAX, 0);
-            for &(slot, _) in slots {
+            for &slot in points.slots() {
                 let bits = self.values.bits(slot, chunks)[chunk];
                 all &= bits;
                 any |= bits;
@@ -102,7 +152,7 @@ impl DirectMesh {
                 return Some([1.0; LANES]);
             }
             let mut visible: Lanes = [0.0; LANES];
-            for &(slot, weight) in slots {
+            for (slot, weight) in points.iter() {
                 let bits = self.values.bits(slot, chunks)[chunk];
                 for (lane, sum) in visible.iter_mut().enumerate() {
                     *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
@@ -113,35 +163,35 @@ impl DirectMesh {
     }
 
     /// What D_y says of the lights: per chunk the lights that all of D_y sees (`seen`), and those on which its
-    /// points disagree (`mixed`). Returns whether D_y was empty and the nearest point spoke for it.
+    /// points disagree (`mixed`).
     #[inline(always)]
-    pub fn verdict(
+    pub fn verdict<A: Accel>(
         &self,
+        accel: &A,
         surface: &SurfacePoint,
         scratch: &mut Scratch,
         seen: &mut [VisibilityBits],
         mixed: &mut [VisibilityBits],
-    ) -> bool {
-        let fallback = self.points.neighbours(surface, &mut scratch.neighbours);
+    ) {
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let chunks = self.lights.chunks().len();
         seen.fill(VisibilityBits::MAX);
         mixed.fill(0);
-        for (id, _) in scratch.neighbours.iter() {
-            let bits = self.values.bits(self.points.slot(id), chunks);
+        for &slot in scratch.points.slots() {
+            let bits = self.values.bits(slot, chunks);
             for ((all, any), bits) in seen.iter_mut().zip(&mut *mixed).zip(bits) {
                 *all &= bits;
                 *any |= bits;
             }
         }
         mixed.iter_mut().zip(seen).for_each(|(any, all)| *any &= !*all);
-        fallback
     }
 
     /// Ĩ of eq. (3), and the same mean of the unoccluded field.
     #[inline(always)]
-    fn mean_direct_light(&self, slots: &[(u32, f32)], scale: f32) -> [Vec3; 2] {
+    fn mean_direct_light(&self, points: &Neighbours, scale: f32) -> [Vec3; 2] {
         let mut sums = [0.0f32; 6];
-        for &(slot, weight) in slots {
+        for (slot, weight) in points.iter() {
             for (sum, value) in sums.iter_mut().zip(self.values.values::<6>(slot)) {
                 *sum += weight * value;
             }

@@ -9,13 +9,14 @@ use rayon::prelude::*;
 
 use super::directional::{self, COEFFICIENTS};
 use super::estimator::{DirectMesh, Scratch};
+use super::leaks::is_inside_by_share;
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::sphere::SphereStrata;
 use super::store::{NeededPoints, PointMask};
 use crate::accel::{Accel, Coherence, Hit, PacketLanes, Ray, RayHitPacket, hit_of_lane};
 use crate::scene::{Scene, SurfacePoint};
-use crate::settings::{IndirectForm, IndirectSettings, Normalization};
+use crate::settings::{IndirectForm, IndirectSettings, Leaks, Normalization};
 
 /// Rays that an evaluation traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,6 +35,10 @@ pub struct IndirectMesh {
     settings: IndirectSettings,
     /// IndirectLight by slot, [`IndirectMesh::stride`] numbers each, as means over directions.
     values: Vec<f32>,
+    /// Mean light from all around by slot, summed over the channels.
+    amounts: Vec<f32>,
+    /// Points inside of geometry, by slot.
+    inside: Vec<bool>,
 }
 
 /// New mesh points with what their rays hit: N entries per point.
@@ -54,6 +59,8 @@ impl IndirectMesh {
             strata: SphereStrata::new(settings.directions),
             settings: settings.clone(),
             values: Vec::new(),
+            amounts: Vec::new(),
+            inside: Vec::new(),
         })
     }
 
@@ -86,8 +93,21 @@ impl IndirectMesh {
                 break;
             }
             let hits = self.trace(accel, &new);
+            if self.points.leaks() == Leaks::Invalidate {
+                let seen = new.par_iter().zip(hits.par_chunks(self.strata.len() as usize));
+                let inside: Vec<bool> = seen
+                    .map(|(&x, hits)| {
+                        let mut backs = 0;
+                        self.for_each_hit(scene, x, hits, |_, surface| {
+                            backs += usize::from(surface.is_some_and(|surface| surface.shows_back()));
+                        });
+                        is_inside_by_share(backs, hits.len())
+                    })
+                    .collect();
+                self.inside.extend(inside);
+            }
             rays.indirect += hits.len() as u64;
-            rays.shadow += direct.evaluate(accel, &self.needed_at(scene, &new, &hits, &direct.points));
+            rays.shadow += direct.evaluate(accel, scene, &self.needed_at(scene, &new, &hits, &direct.points));
             needed = if self.settings.bounces > 1 {
                 self.needed_at(scene, &new, &hits, &self.points)
             } else {
@@ -97,7 +117,7 @@ impl IndirectMesh {
             gathering.hits.extend(hits);
         }
         if !gathering.points.is_empty() {
-            self.solve(scene, direct, direct_scale, &gathering);
+            rays.shadow += self.solve(accel, scene, direct, direct_scale, &gathering);
         }
         rays
     }
@@ -162,7 +182,7 @@ impl IndirectMesh {
                     self.for_each_hit(scene, x, hits, |_, surface| {
                         if let Some(surface) = surface {
                             mesh.neighbours(&surface, &mut neighbours);
-                            neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                            neighbours.ids().iter().for_each(|&id| needed.insert(id));
                         }
                     });
                 }
@@ -173,18 +193,29 @@ impl IndirectMesh {
     }
 
     /// Eq. (4) for new points: one bounce, then as many more as asked for or until nothing changes any more.
-    fn solve(&mut self, scene: &Scene, direct: &DirectMesh, direct_scale: f32, gathering: &Gathering) {
+    /// Returns the number of occlusion rays that it took to keep light from leaking.
+    fn solve<A: Accel>(
+        &mut self,
+        accel: &A,
+        scene: &Scene,
+        direct: &DirectMesh,
+        direct_scale: f32,
+        gathering: &Gathering,
+    ) -> u64 {
         let first = self.values.len();
-        let one_bounce = self.sweep(scene, gathering, scene.background, |surface, scratch| {
-            let illumination = direct.illumination(surface, scratch).0 * direct_scale;
+        let (one_bounce, mut rays) = self.sweep(scene, gathering, scene.background, |surface, scratch| {
+            let illumination = direct.illumination(accel, surface, scratch) * direct_scale;
             surface.emission + surface.diffuse * illumination
         });
         self.values.extend_from_slice(&one_bounce);
+        self.amounts.resize(first / self.stride() + gathering.points.len(), 0.0);
+        self.measure(gathering.points.len());
         let peak = |values: &[f32]| values.iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
         for _ in 1..self.settings.bounces {
-            let mut next = self.sweep(scene, gathering, Vec3::ZERO, |surface, scratch| {
-                surface.diffuse * self.mean_indirect_light(surface, scratch)
+            let (mut next, more) = self.sweep(scene, gathering, Vec3::ZERO, |surface, scratch| {
+                surface.diffuse * self.illumination(accel, surface, scratch)
             });
+            rays += more;
             next.iter_mut().zip(&one_bounce).for_each(|(value, first)| *value += first);
             let change = next
                 .iter()
@@ -192,10 +223,12 @@ impl IndirectMesh {
                 .fold(0.0f32, |change, (next, value)| change.max((next - value).abs()));
             let done = change <= self.settings.tolerance * peak(&next);
             self.values[first..].copy_from_slice(&next);
+            self.measure(gathering.points.len());
             if done {
                 break;
             }
         }
+        rays
     }
 
     /// Mean over the directions of the radiance that surfaces send back, or of `background` where there is none.
@@ -205,15 +238,15 @@ impl IndirectMesh {
         gathering: &Gathering,
         background: Vec3,
         radiance: impl Fn(&SurfacePoint, &mut Scratch) -> Vec3 + Sync,
-    ) -> Vec<f32> {
+    ) -> (Vec<f32>, u64) {
         let stride = self.stride();
         let directions = self.strata.len() as usize;
         let mut values = vec![0.0f32; gathering.points.len() * stride];
-        values
+        let rays = values
             .par_chunks_mut(stride)
             .zip(gathering.hits.par_chunks(directions))
             .zip(&gathering.points)
-            .for_each(|((value, hits), &x)| {
+            .map(|((value, hits), &x)| {
                 pulp::Arch::new().dispatch(|| {
                     let mut scratch = Scratch::default();
                     let mut sums = [0.0f32; directional::STRIDE];
@@ -228,9 +261,26 @@ impl IndirectMesh {
                     for (value, sum) in value.iter_mut().zip(&sums) {
                         *value = sum * scale;
                     }
-                });
-            });
-        values
+                    scratch.rays
+                })
+            })
+            .sum();
+        (values, rays)
+    }
+
+    /// Brings the amounts of the last `count` points up to date.
+    fn measure(&mut self, count: usize) {
+        let first = self.amounts.len() - count;
+        for slot in first..self.amounts.len() {
+            let value = self.value(slot as u32);
+            self.amounts[slot] = match self.settings.form {
+                IndirectForm::Scalar => value.iter().sum(),
+                // The squares' coefficients sum to (15 + 3·3)/32 of the light, times 4, for each channel.
+                IndirectForm::Directional => {
+                    value.chunks(COEFFICIENTS).take(3).map(|c| (c[3] + c[4] + c[5]) / 3.0).sum()
+                }
+            };
+        }
     }
 
     /// Adds light from one direction to a point's numbers.
@@ -257,15 +307,12 @@ impl IndirectMesh {
     /// Ĩ_d of eq. (5) at a surface point, all of whose D_y must be known; with the mean normalization it is the
     /// radiance that an all-white surface would send back.
     #[inline(always)]
-    pub fn illumination(&self, surface: &SurfacePoint, scratch: &mut Scratch) -> (Vec3, bool) {
-        let fallback = self.points.neighbours(surface, &mut scratch.neighbours);
+    pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let mut sums = [0.0f32; directional::STRIDE];
-        let mut total = 0.0;
-        let stride = self.stride();
-        for (id, weight) in scratch.neighbours.iter() {
-            let value = &self.values[self.points.slot(id) as usize * stride..][..stride];
-            total += weight;
-            for (sum, value) in sums.iter_mut().zip(value) {
+        let total = scratch.points.total_weight();
+        for (slot, weight) in scratch.points.iter() {
+            for (sum, value) in sums.iter_mut().zip(self.value(slot)) {
                 *sum += weight * value;
             }
         }
@@ -277,12 +324,27 @@ impl IndirectMesh {
             Normalization::Mean => 1.0 / total,
             Normalization::Integral => 4.0 * std::f32::consts::PI / total,
         };
-        (mean * scale, fallback)
+        mean * scale
     }
 
     #[inline(always)]
-    fn mean_indirect_light(&self, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        self.illumination(surface, scratch).0
+    fn value(&self, slot: u32) -> &[f32] {
+        let stride = self.stride();
+        &self.values[slot as usize * stride..][..stride]
+    }
+
+    /// Whether the points see so different amounts of light that a wall may stand between them.
+    #[inline(always)]
+    fn disagree(&self, slots: &[u32]) -> bool {
+        /// Ratio of amounts that neighbouring points in one room rarely exceed.
+        const CONTRAST: f32 = 1.5;
+        let (mut least, mut most) = (f32::INFINITY, 0.0f32);
+        for &slot in slots {
+            let amount = self.amounts[slot as usize];
+            least = least.min(amount);
+            most = most.max(amount);
+        }
+        most > CONTRAST * least
     }
 
     /// Bytes held by slots and values.

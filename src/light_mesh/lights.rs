@@ -255,6 +255,7 @@ mod tests {
             specular: Vec3::ZERO,
             emission: Vec3::ZERO,
             front: true,
+            two_sided: false,
             culled: false,
         }
     }

@@ -5,11 +5,14 @@ mod directional;
 mod estimator;
 mod indirect;
 mod lattice;
+mod leaks;
 mod lights;
 mod neighbours;
 mod points;
+mod scattered;
 mod sphere;
 mod store;
+mod tiled;
 
 pub use direct::{Basis, DirectValues};
 pub use estimator::{DirectMesh, Scratch};

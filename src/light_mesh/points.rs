@@ -4,9 +4,11 @@ use glam::Vec3;
 
 use super::lattice::Lattice;
 use super::neighbours::{Ball, Neighbours};
+use super::scattered::ScatteredPoints;
 use super::store::{PointMask, SlotTable, UNKNOWN};
+use super::tiled::{TileLayout, TiledPoints};
 use crate::scene::{Bounds, SurfacePoint};
-use crate::settings::{Neighbourhood, PointSettings, Radius, Spacing};
+use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Spacing};
 
 /// How often the points of a light mesh were asked for and evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -21,13 +23,50 @@ pub struct PointCounters {
     pub nearest_fallback: u64,
 }
 
+/// Why a light mesh can't be set up.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// Spacing below what coordinates or point numbers can express.
+    #[error("spacing {0} of the light mesh is too fine for a scene of this size")]
+    TooFine(Vec3),
+}
+
+/// The positions of mesh points: one interface over all layouts.
+enum PointSet {
+    Lattice(Lattice),
+    Tiled(TiledPoints),
+    Scattered(ScatteredPoints),
+}
+
+/// Runs `$body` with `$set` bound to the layout's own type.
+macro_rules! with_set {
+    ($points:expr, $set:ident => $body:expr) => {
+        match $points {
+            PointSet::Lattice($set) => $body,
+            PointSet::Tiled($set) => $body,
+            PointSet::Scattered($set) => $body,
+        }
+    };
+}
+
+/// Points for one part of space.
+struct Layer {
+    /// Where it holds; `None` for everywhere.
+    bounds: Option<Bounds>,
+    points: PointSet,
+    radius: f32,
+    /// Id of its first point; a multiple of 64.
+    first_id: u64,
+}
+
 /// Mesh points, their slots, and the shape of D_y.
 pub struct MeshPoints {
-    lattice: Lattice,
+    /// The whole scene first, then the regions: the last one that holds y decides.
+    layers: Vec<Layer>,
     table: SlotTable,
-    radius: f32,
     neighbourhood: Neighbourhood,
     hemisphere: bool,
+    leaks: Leaks,
     /// Counters since creation.
     pub counters: PointCounters,
 }
@@ -35,12 +74,26 @@ pub struct MeshPoints {
 /// With `spacing = "auto"` the scene's diagonal is this many spacings long.
 const AUTO_SPACINGS: f32 = 120.0;
 
-/// Why a light mesh can't be set up.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MeshError {
-    /// Spacing below what coordinates can express.
-    #[error("light_mesh.spacing: {0} is too fine for a scene of this size")]
-    TooFine(Vec3),
+impl Layer {
+    fn new(
+        bounds: Bounds,
+        region: Option<Bounds>,
+        settings: &PointSettings,
+        spacing: Vec3,
+        radius: f32,
+        first_id: u64,
+    ) -> Result<Self, MeshError> {
+        let tiled = |layout, seed| TiledPoints::new(bounds, spacing, radius, layout, seed);
+        let points = match &settings.layout {
+            PointLayout::List(positions) => PointSet::Scattered(ScatteredPoints::new(positions, radius)),
+            _ if Lattice::too_fine(bounds, spacing) => return Err(MeshError::TooFine(spacing)),
+            PointLayout::Regular => PointSet::Lattice(Lattice::new(bounds, spacing, radius)),
+            PointLayout::BodyCentred => PointSet::Tiled(tiled(TileLayout::BodyCentred, 0)),
+            PointLayout::Jittered { seed } => PointSet::Tiled(tiled(TileLayout::Jittered, *seed)),
+            PointLayout::BlueNoise { seed } => PointSet::Tiled(tiled(TileLayout::BlueNoise, *seed)),
+        };
+        Ok(Self { bounds: region, points, radius, first_id })
+    }
 }
 
 impl MeshPoints {
@@ -53,24 +106,41 @@ impl MeshPoints {
                 Vec3::splat(if diagonal > 0.0 { diagonal / AUTO_SPACINGS } else { 1.0 })
             }
         };
-        let radius = match settings.radius {
+        let radius_for = |spacing: Vec3| match settings.radius {
             Radius::Units(radius) => radius,
             Radius::Spacings(factor) => factor * spacing.max_element(),
         };
-        if Lattice::too_fine(bounds, spacing) {
-            return Err(MeshError::TooFine(spacing));
+        let mut layers = vec![Layer::new(bounds, None, settings, spacing, radius_for(spacing), 0)?];
+        let mut next_id =
+            |layer: &Layer| layer.first_id + with_set!(&layer.points, set => set.brick_count()) * 64;
+        for region in &settings.regions {
+            let spacing = region.spacing.unwrap_or(spacing);
+            let radius = region.radius.unwrap_or_else(|| radius_for(spacing));
+            let first_id = layers.last().map_or(0, &mut next_id);
+            let layer = Layer::new(region.bounds, Some(region.bounds), settings, spacing, radius, first_id)?;
+            layers.push(layer);
         }
-        let lattice = Lattice::new(bounds, spacing, radius);
-        let table = SlotTable::new(lattice.brick_count());
-        let counters = PointCounters { total: lattice.len(), ..PointCounters::default() };
+        let bricks = layers.last().map_or(0, next_id) / 64;
+        let total = layers.iter().map(|layer| with_set!(&layer.points, set => set.len())).sum();
         Ok(Self {
-            lattice,
-            table,
-            radius,
+            layers,
+            table: SlotTable::new(bricks),
             neighbourhood: settings.neighbourhood,
             hemisphere: settings.hemisphere,
-            counters,
+            leaks: settings.leaks,
+            counters: PointCounters { total, ..PointCounters::default() },
         })
+    }
+
+    #[inline(always)]
+    fn layer_at(&self, y: Vec3) -> &Layer {
+        let mut found = &self.layers[0];
+        for layer in &self.layers[1..] {
+            if layer.bounds.is_some_and(|bounds| bounds.contains(y)) {
+                found = layer;
+            }
+        }
+        found
     }
 
     /// D_y of a surface point with weights, in a fixed order; returns whether it was empty and the nearest
@@ -78,17 +148,30 @@ impl MeshPoints {
     #[inline(always)]
     pub fn neighbours(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
         out.clear();
+        let layer = self.layer_at(surface.position);
         let normal = self.hemisphere.then_some(surface.geometric_normal);
         let smooth = self.neighbourhood == Neighbourhood::SmoothSphere;
-        let ball = Ball::new(surface.position, normal, self.radius, smooth);
-        if self.neighbourhood != Neighbourhood::Nearest {
-            self.lattice.gather(&ball, out);
-        }
-        let fallback = out.is_empty();
-        if fallback {
-            out.push(self.lattice.nearest(&ball), 1.0);
-        }
-        fallback && self.neighbourhood != Neighbourhood::Nearest
+        let ball = Ball::new(surface.position, normal, layer.radius, smooth);
+        with_set!(&layer.points, set => {
+            if self.neighbourhood != Neighbourhood::Nearest {
+                set.gather(&ball, out);
+            }
+            let fallback = out.is_empty();
+            if fallback {
+                out.push(set.nearest(&ball), 1.0);
+            }
+            if layer.first_id > 0 {
+                out.offset_ids(layer.first_id);
+            }
+            fallback && self.neighbourhood != Neighbourhood::Nearest
+        })
+    }
+
+    /// Position of a point.
+    pub fn position(&self, id: u64) -> Vec3 {
+        let index = self.layers.partition_point(|layer| layer.first_id <= id).saturating_sub(1);
+        let layer = &self.layers[index];
+        with_set!(&layer.points, set => set.position(id - layer.first_id))
     }
 
     /// Makes the needed points known; returns the positions of those that were not, in slot order.
@@ -96,7 +179,7 @@ impl MeshPoints {
         let new = self.table.claim(needed);
         self.counters.needed += needed.len();
         self.counters.evaluated += new.len() as u64;
-        new.into_iter().map(|id| self.lattice.position(id)).collect()
+        new.into_iter().map(|id| self.position(id)).collect()
     }
 
     /// Slot of a known point.
@@ -107,14 +190,14 @@ impl MeshPoints {
         slot
     }
 
-    /// Number of known points.
-    pub fn known(&self) -> usize {
-        self.table.used()
+    /// What is done against leaks.
+    pub fn leaks(&self) -> Leaks {
+        self.leaks
     }
 
-    /// R, scene units.
+    /// R outside of all regions, scene units.
     pub fn radius(&self) -> f32 {
-        self.radius
+        self.layers[0].radius
     }
 
     /// Bytes held.

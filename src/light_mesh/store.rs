@@ -104,7 +104,7 @@ impl SlotTable {
     }
 
     /// Gives slots to those points of the set that are unknown; returns their ids, whose slots follow
-    /// each other from the former [`SlotTable::used`] on. From here on they count as known.
+    /// each other after those given away before. From here on they count as known.
     pub fn claim(&mut self, needed: &PointMask) -> Vec<u64> {
         let mut new = Vec::new();
         for &(brick, mask) in &needed.0 {
@@ -129,11 +129,6 @@ impl SlotTable {
             }
         }
         new
-    }
-
-    /// Number of slots given away, which is the number of known points.
-    pub fn used(&self) -> usize {
-        self.used as usize
     }
 
     /// Bytes held.
@@ -228,7 +223,6 @@ mod tests {
             assert_eq!(table.slot(193), 3);
             assert_eq!(table.slot(195), UNKNOWN);
             assert_eq!(table.slot(64), UNKNOWN);
-            assert_eq!(table.used(), 5);
         }
     }
 

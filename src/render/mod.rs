@@ -266,7 +266,7 @@ fn needed_by(paths: &[TilePaths], points: &MeshPoints) -> Vec<(u64, u64)> {
                 let mut neighbours = Neighbours::default();
                 for vertex in &tile.vertices {
                     points.neighbours(&vertex.surface, &mut neighbours);
-                    neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                    neighbours.ids().iter().for_each(|&id| needed.insert(id));
                 }
                 needed.into_bricks().collect()
             })
@@ -296,7 +296,7 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
 
     fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
         let needed = PointMask::union(needed_by(paths, &self.meshes.direct.points));
-        stats.rays.shadow += self.meshes.direct.evaluate(self.accel, &needed);
+        stats.rays.shadow += self.meshes.direct.evaluate(self.accel, self.scene, &needed);
     }
 
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
@@ -304,37 +304,37 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
             let scale = direct_scale(self.settings);
             let LightMeshes { direct, indirect } = &*self.meshes;
             let mut scratch = Scratch::default();
-            let mut indirect_fallbacks = 0;
-            let mut add_indirect = |vertex: &PathVertex, direct_light: Vec3, scratch: &mut Scratch| {
+            let mut indirect_scratch = Scratch::default();
+            let mut add_indirect = |vertex: &PathVertex, direct_light: Vec3| {
                 let mut illumination = direct_light * scale;
                 if let Some(indirect) = indirect {
-                    let (light, fallback) = indirect.illumination(&vertex.surface, scratch);
-                    illumination += light;
-                    indirect_fallbacks += u64::from(fallback);
+                    illumination += indirect.illumination(self.accel, &vertex.surface, &mut indirect_scratch);
                 }
                 emit(vertex, illumination);
             };
-            let mut counters = ShadeCounters::default();
+            let mut shadow_rays = 0;
             if self.settings.light_mesh.resolve == Resolve::Trace
                 && self.settings.light_mesh.estimator == Estimator::PerLight
             {
-                let mut indirect_scratch = Scratch::default();
-                counters = shade_traced(
+                shadow_rays = shade_traced(
                     self.accel,
                     direct.lights(),
                     vertices,
-                    &mut |vertex, light| add_indirect(vertex, light, &mut indirect_scratch),
-                    |vertex, seen, mixed| direct.verdict(&vertex.surface, &mut scratch, seen, mixed),
+                    &mut add_indirect,
+                    |vertex, seen, mixed| {
+                        direct.verdict(self.accel, &vertex.surface, &mut scratch, seen, mixed);
+                    },
                 );
             } else {
                 for vertex in vertices {
-                    let (light, fallback) = direct.illumination(&vertex.surface, &mut scratch);
-                    counters.direct_fallbacks += u64::from(fallback);
-                    add_indirect(vertex, light, &mut scratch);
+                    add_indirect(vertex, direct.illumination(self.accel, &vertex.surface, &mut scratch));
                 }
             }
-            counters.indirect_fallbacks = indirect_fallbacks;
-            counters
+            ShadeCounters {
+                shadow_rays: shadow_rays + scratch.rays + indirect_scratch.rays,
+                direct_fallbacks: scratch.fallbacks,
+                indirect_fallbacks: indirect_scratch.fallbacks,
+            }
         })
     }
 }
@@ -346,27 +346,26 @@ fn direct_scale(settings: &Settings) -> f32 {
 
 /// Shades with occlusion rays from the surface points to those lights that `decide` leaves open.
 ///
-/// `decide(vertex, seen, undecided)` fills in, per chunk, the lights known to be visible and the lights to ask; it
-/// returns whether it had to fall back to the nearest mesh point.
+/// `decide(vertex, seen, undecided)` fills in, per chunk, the lights known to be visible and the lights to ask.
+/// Returns the number of rays.
 #[inline(always)]
 fn shade_traced<A: Accel>(
     accel: &A,
     lights: &LightTable,
     vertices: &[PathVertex],
     emit: &mut dyn FnMut(&PathVertex, Vec3),
-    mut decide: impl FnMut(&PathVertex, &mut [VisibilityBits], &mut [VisibilityBits]) -> bool,
-) -> ShadeCounters {
-    let mut counters = ShadeCounters::default();
+    mut decide: impl FnMut(&PathVertex, &mut [VisibilityBits], &mut [VisibilityBits]),
+) -> u64 {
+    let mut rays = 0;
     let chunks = lights.chunks().len();
     let mut bits = vec![0; chunks * LANES];
     let mut undecided = bits.clone();
     for group in vertices.chunks(LANES) {
         for (point, vertex) in group.iter().enumerate() {
             let range = point * chunks..(point + 1) * chunks;
-            let fallback = decide(vertex, &mut bits[range.clone()], &mut undecided[range]);
-            counters.direct_fallbacks += u64::from(fallback);
+            decide(vertex, &mut bits[range.clone()], &mut undecided[range]);
         }
-        counters.shadow_rays += see_lights_from_surface(accel, lights, group, &undecided, &mut bits);
+        rays += see_lights_from_surface(accel, lights, group, &undecided, &mut bits);
         for (point, vertex) in group.iter().enumerate() {
             let visible = &bits[point * chunks..];
             let illumination = lights.illuminate(&vertex.surface, |chunk| {
@@ -375,7 +374,7 @@ fn shade_traced<A: Accel>(
             emit(vertex, illumination);
         }
     }
-    counters
+    rays
 }
 
 struct ConventionalIntegrator<'a, A> {
@@ -390,13 +389,14 @@ impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
     fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
         pulp::Arch::new().dispatch(|| {
             let mut scaled = |vertex: &PathVertex, light: Vec3| emit(vertex, light * self.scale);
-            shade_traced(self.accel, &self.lights, vertices, &mut scaled, |_, seen, undecided| {
-                seen.fill(0);
-                for (bits, chunk) in undecided.iter_mut().zip(self.lights.chunks()) {
-                    *bits = chunk.used;
-                }
-                false
-            })
+            let shadow_rays =
+                shade_traced(self.accel, &self.lights, vertices, &mut scaled, |_, seen, undecided| {
+                    seen.fill(0);
+                    for (bits, chunk) in undecided.iter_mut().zip(self.lights.chunks()) {
+                        *bits = chunk.used;
+                    }
+                });
+            ShadeCounters { shadow_rays, ..ShadeCounters::default() }
         })
     }
 }

@@ -2,9 +2,12 @@
 
 mod bounds;
 mod camera;
+pub mod generate;
 mod light;
+pub mod load;
 mod material;
 mod mesh;
+pub mod random;
 mod surface;
 
 use std::sync::Arc;

@@ -27,6 +27,8 @@ pub struct SurfacePoint {
     pub emission: Vec3,
     /// Whether the front of the triangle (counter-clockwise winding) was seen.
     pub front: bool,
+    /// Whether both sides of the material are alike.
+    pub two_sided: bool,
     /// Whether rays of sight pass through this side (a culled back face).
     pub culled: bool,
 }
@@ -36,6 +38,11 @@ impl SurfacePoint {
     #[inline(always)]
     pub fn ray_origin(&self) -> Vec3 {
         self.position + self.geometric_normal * self.offset
+    }
+
+    /// Whether it is the back of a one-sided surface.
+    pub fn shows_back(&self) -> bool {
+        !self.front && !self.two_sided
     }
 }
 
@@ -105,6 +112,7 @@ impl Scene {
             specular: material.specular,
             emission: if front || material.two_sided { material.emission } else { Vec3::ZERO },
             front,
+            two_sided: material.two_sided,
             culled: !front && material.cull && !material.two_sided,
         }
     }

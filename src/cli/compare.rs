@@ -1,0 +1,266 @@
+//! `lightmesh compare`: how far a picture is from a reference.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use serde_json::{Map, Value, json};
+
+use crate::image::error_picture::error_picture;
+use crate::image::metrics::{self, Metrics, MetricsError, MetricsOptions};
+use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
+
+/// Compare a picture with a reference.
+///
+/// Both may be EXR or PNG. Prints one line per number, or JSON. Ends with 0, or with 1 if a number is above a
+/// limit, a pixel is not finite, or something failed.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CompareArgs {
+    /// The picture
+    #[arg(value_name = "A")]
+    pub image: PathBuf,
+
+    /// The reference
+    #[arg(value_name = "B")]
+    pub reference: PathBuf,
+
+    /// Write a PNG of the errors in false colours: black for none, light yellow for full scale, green for pixels
+    /// that are not finite
+    #[arg(long, value_name = "F.png")]
+    pub error_picture: Option<PathBuf>,
+
+    /// Error at full scale of the error picture, as a share of the reference's mean
+    #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = positive)]
+    pub error_scale: f64,
+
+    /// Fail if a number is above a limit: a number for relative_rmse, or METRIC=NUMBER with rmse, relative_rmse,
+    /// mean_relative_error, block_mean_relative_error, flip, max_abs or differing_pixels; may be repeated
+    #[arg(long, value_name = "[METRIC=]NUMBER")]
+    pub fail_above: Vec<Limit>,
+
+    /// Count a pixel as differing only if a channel differs by more than this share of the reference's mean
+    /// [default: any bit]
+    #[arg(long, value_name = "SHARE", value_parser = non_negative)]
+    pub differ_above: Option<f64>,
+
+    /// Exposure in stops of the tone mapping before PSNR and FLIP
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
+    pub exposure: f32,
+
+    /// Print JSON; numbers that are not defined, such as the PSNR of equal pictures, are null
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A number whose exceeding fails the comparison.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    metric: Metric,
+    limit: f64,
+}
+
+/// The numbers that are the worse the larger they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Metric {
+    Rmse,
+    RelativeRmse,
+    MeanRelativeError,
+    BlockMeanRelativeError,
+    Flip,
+    MaxAbs,
+    DifferingPixels,
+}
+
+impl Metric {
+    const ALL: [Self; 7] = [
+        Self::Rmse,
+        Self::RelativeRmse,
+        Self::MeanRelativeError,
+        Self::BlockMeanRelativeError,
+        Self::Flip,
+        Self::MaxAbs,
+        Self::DifferingPixels,
+    ];
+
+    /// The name in JSON and on the command line.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rmse => "rmse",
+            Self::RelativeRmse => "relative_rmse",
+            Self::MeanRelativeError => "mean_relative_error",
+            Self::BlockMeanRelativeError => "block_mean_relative_error",
+            Self::Flip => "flip",
+            Self::MaxAbs => "max_abs",
+            Self::DifferingPixels => "differing_pixels",
+        }
+    }
+
+    fn of(self, metrics: &Metrics) -> Option<f64> {
+        match self {
+            Self::Rmse => metrics.rmse,
+            Self::RelativeRmse => metrics.relative_rmse,
+            Self::MeanRelativeError => metrics.mean_relative_error,
+            Self::BlockMeanRelativeError => metrics.block_mean_relative_error,
+            Self::Flip => metrics.flip,
+            Self::MaxAbs => metrics.max.map(|max| max.value),
+            Self::DifferingPixels => Some(metrics.differing_pixels as f64),
+        }
+    }
+}
+
+impl FromStr for Limit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, number) = text.split_once('=').unwrap_or((Metric::RelativeRmse.name(), text));
+        let name = name.trim().replace('-', "_");
+        let metric = Metric::ALL.into_iter().find(|metric| metric.name() == name).ok_or_else(|| {
+            format!("no metric {name}; there are {}", Metric::ALL.map(Metric::name).join(", "))
+        })?;
+        Ok(Self { metric, limit: non_negative(number.trim())? })
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| "not a number".to_owned())
+}
+
+fn non_negative(text: &str) -> Result<f64, String> {
+    number(text)
+        .and_then(|value| if value >= 0.0 { Ok(value) } else { Err("must not be negative".to_owned()) })
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| if value > 0.0 { Ok(value) } else { Err("must be above 0".to_owned()) })
+}
+
+fn stops(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| {
+        if value.abs() <= 100.0 { Ok(value as f32) } else { Err("must be between -100 and 100".to_owned()) }
+    })
+}
+
+/// How a comparison ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// All numbers are within their limits and all pixels are finite.
+    Passed,
+    /// A number is above its limit or not defined, or a pixel is not finite.
+    Failed,
+}
+
+/// A comparison that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The pictures cannot be compared.
+    #[error("{} and {}: {source}", image.display(), reference.display())]
+    Metrics {
+        /// The picture.
+        image: PathBuf,
+        /// The reference.
+        reference: PathBuf,
+        /// Why not.
+        source: MetricsError,
+    },
+    /// The error picture's name has another extension than .png.
+    #[error("{}: an error picture is a .png", .0.display())]
+    ErrorPictureFormat(PathBuf),
+    /// The result could not be printed.
+    #[error("cannot print the result: {0}")]
+    Print(#[from] std::io::Error),
+}
+
+/// Compares two pictures and prints the result to `out`.
+///
+/// # Errors
+///
+/// If a file cannot be read or written, or the pictures differ in size; then nothing is printed.
+pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Verdict, CompareError> {
+    let error_target = match &args.error_picture {
+        Some(path) => {
+            let target = OutputTarget::new(path)?;
+            if target.format() != ImageFormat::Png {
+                return Err(CompareError::ErrorPictureFormat(path.clone()));
+            }
+            Some(target)
+        }
+        None => None,
+    };
+    let picture = image::read(&args.image)?;
+    let reference = image::read(&args.reference)?;
+    let incomparable = |source| CompareError::Metrics {
+        image: args.image.clone(),
+        reference: args.reference.clone(),
+        source,
+    };
+    let options = MetricsOptions { exposure: args.exposure, threshold: args.differ_above };
+    let metrics = metrics::compare(&picture, &reference, options).map_err(incomparable)?;
+
+    if let Some(target) = error_target {
+        let colours = error_picture(&picture, &reference, args.error_scale).map_err(incomparable)?;
+        let scale =
+            format!("mean of |A - B| over the channels; magma from 0 to {} of B's mean", args.error_scale);
+        let metadata = [("Description".to_owned(), scale)];
+        let bytes =
+            png::encode_rgb8(picture.width(), picture.height(), &colours, &metadata).map_err(|error| {
+                ImageError::Encode { path: target.path().to_path_buf(), cause: error.to_string() }
+            })?;
+        target.file().write(&bytes)?;
+    }
+
+    let exceeded: Vec<&Limit> = args.fail_above.iter().filter(|limit| limit.exceeded_by(&metrics)).collect();
+    let not_finite = metrics.non_finite_pixels + metrics.reference_non_finite_pixels;
+    let verdict = if exceeded.is_empty() && not_finite == 0 { Verdict::Passed } else { Verdict::Failed };
+
+    let fields = fields(&picture, &metrics);
+    if args.json {
+        let object: Map<String, Value> =
+            fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        writeln!(out, "{:#}", Value::Object(object))?;
+    } else {
+        for (name, value) in &fields {
+            let value = if value.is_null() { "undefined".to_owned() } else { value.to_string() };
+            writeln!(out, "{name:<28} {value}")?;
+        }
+        for Limit { metric, limit } in exceeded {
+            writeln!(out, "{} is not within {limit}", metric.name())?;
+        }
+        if not_finite > 0 {
+            writeln!(out, "pixels that are not finite were left out of the numbers above")?;
+        }
+    }
+    Ok(verdict)
+}
+
+impl Limit {
+    /// Whether the number is above the limit; one that is not defined cannot be said to be within.
+    fn exceeded_by(&self, metrics: &Metrics) -> bool {
+        self.metric.of(metrics).is_none_or(|value| value > self.limit)
+    }
+}
+
+/// What is printed, by name.
+fn fields(image: &Image, metrics: &Metrics) -> Vec<(&'static str, Value)> {
+    let max = metrics.max;
+    vec![
+        ("rmse", json!(metrics.rmse)),
+        ("relative_rmse", json!(metrics.relative_rmse)),
+        ("mean_relative_error", json!(metrics.mean_relative_error)),
+        ("block_mean_relative_error", json!(metrics.block_mean_relative_error)),
+        ("psnr", json!(metrics.psnr)),
+        ("flip", json!(metrics.flip)),
+        ("max_abs", json!(max.map(|max| max.value))),
+        ("max_abs_pixel", json!(max.map(|max| [max.pixel.0, max.pixel.1]))),
+        ("max_abs_channel", json!(max.and_then(|max| ["R", "G", "B"].get(max.channel)))),
+        ("differing_pixels", json!(metrics.differing_pixels)),
+        ("non_finite_pixels", json!(metrics.non_finite_pixels)),
+        ("reference_non_finite_pixels", json!(metrics.reference_non_finite_pixels)),
+        ("mean", json!(metrics.mean)),
+        ("reference_mean", json!(metrics.reference_mean)),
+        ("width", json!(image.width())),
+        ("height", json!(image.height())),
+    ]
+}

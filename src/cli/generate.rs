@@ -1,0 +1,54 @@
+//! `lightmesh generate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use crate::scene::generate::GenerateError;
+use crate::scene::generate::forest::Forest;
+
+/// Write a scene made by rule
+#[derive(Args, Clone, Debug)]
+pub struct GenerateArgs {
+    /// What to generate.
+    #[command(subcommand)]
+    pub scene: GeneratedScene,
+}
+
+/// What can be generated.
+#[derive(Subcommand, Clone, Debug)]
+pub enum GeneratedScene {
+    /// Trees with separate small leaves under point lights: forest.obj, forest.mtl and forest.toml
+    Forest(ForestArgs),
+}
+
+/// Arguments of `lightmesh generate forest`.
+#[derive(Args, Clone, Debug)]
+pub struct ForestArgs {
+    /// Number of triangles, exactly
+    #[arg(long, value_name = "N", default_value_t = 23_542,
+          value_parser = clap::value_parser!(u32).range(i64::from(Forest::TRIANGLES.0)..=i64::from(Forest::TRIANGLES.1)))]
+    pub triangles: u32,
+    /// Number of point lights
+    #[arg(long, value_name = "N", default_value_t = 100,
+          value_parser = clap::value_parser!(u32).range(i64::from(Forest::LIGHTS.0)..=i64::from(Forest::LIGHTS.1)))]
+    pub lights: u32,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    pub seed: u32,
+    /// Folder to write into, created if need be
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// [`GenerateError`]; then nothing is written.
+pub fn run(args: &GenerateArgs) -> Result<(), GenerateError> {
+    match &args.scene {
+        GeneratedScene::Forest(ForestArgs { triangles, lights, seed, output }) => {
+            Forest { triangles: *triangles, lights: *lights, seed: *seed }.write(output)
+        }
+    }
+}

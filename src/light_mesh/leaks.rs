@@ -1,0 +1,70 @@
+//! Keeping light from leaking through walls, and darkness out of solids (spec §3).
+
+use glam::Vec3;
+
+use super::lights::LANES;
+use super::neighbours::Neighbours;
+use super::points::MeshPoints;
+use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
+use crate::scene::{Scene, SurfacePoint};
+
+/// Directions in which a mesh point looks for back faces: towards the faces and corners of a cube, turned so that
+/// none is parallel to axis-aligned walls.
+const PROBES: usize = 14;
+
+/// A point lies inside of something when more than this share of its probes end at the back of a one-sided surface. In
+/// the open even a crowd of single leaves shows about as many fronts as backs.
+const INSIDE_SHARE: f32 = 0.7;
+
+fn probe(index: usize) -> Vec3 {
+    let cube = match index {
+        0..6 => Vec3::AXES[index / 2] * if index.is_multiple_of(2) { 1.0 } else { -1.0 },
+        _ => {
+            let sign = |bit: usize| if index >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            Vec3::new(sign(0), sign(1), if index < 10 { 1.0 } else { -1.0 })
+        }
+    };
+    // A fixed rotation by an odd angle about an odd axis.
+    glam::Quat::from_axis_angle(Vec3::new(0.36, 0.48, 0.8), 0.83) * cube.normalize()
+}
+
+/// Whether a mesh point lies inside of geometry, judged by the share of back faces that it sees.
+pub fn is_inside<A: Accel>(accel: &A, scene: &Scene, x: Vec3) -> bool {
+    let mut packet = RayHitPacket::<LANES>::empty();
+    for lane in 0..PROBES {
+        packet.set_lane(lane, &Ray::new(x, probe(lane)));
+    }
+    accel.intersect_packet((1 << PROBES) - 1, &mut packet, Coherence::Incoherent);
+    let shows_back = |lane: usize| {
+        hit_of_lane(&packet, lane).is_some_and(|hit| scene.surface_point(&hit, probe(lane)).shows_back())
+    };
+    is_inside_by_share((0..PROBES).filter(|&lane| shows_back(lane)).count(), PROBES)
+}
+
+/// Whether `backs` back faces in so many directions say that the point is inside.
+pub fn is_inside_by_share(backs: usize, directions: usize) -> bool {
+    backs as f32 > INSIDE_SHARE * directions as f32
+}
+
+/// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.
+pub fn keep_visible<A: Accel>(
+    accel: &A,
+    mesh: &MeshPoints,
+    surface: &SurfacePoint,
+    points: &mut Neighbours,
+) -> u64 {
+    let origin = surface.ray_origin();
+    let rays = points.ids().len();
+    let mut blocked = Vec::with_capacity(rays);
+    for group in points.ids().chunks(LANES) {
+        let mut packet = RayPacket::<LANES>::empty();
+        for (lane, &id) in group.iter().enumerate() {
+            packet.set_lane(lane, &Ray::between(origin, mesh.position(id)));
+        }
+        let active = ((1u64 << group.len()) - 1) as u32;
+        let lanes = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+        blocked.extend((0..group.len()).map(|lane| lanes >> lane & 1 == 1));
+    }
+    points.keep(|index, _| !blocked[index]);
+    rays as u64
+}

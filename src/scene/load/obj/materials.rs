@@ -1,0 +1,130 @@
+//! The materials of an OBJ file: its MTL files, found and read, and which are used.
+
+use std::collections::{HashMap, HashSet};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::chunk::{NameKind, NameStatement};
+use crate::scene::Material;
+use crate::scene::load::mtl::parse_mtl;
+use crate::scene::load::{LoadError, Warning};
+
+/// Words of an `mtllib` statement that are tried as one name with spaces.
+const LONGEST_NAME: usize = 16;
+
+/// Materials by name, and those in use.
+#[derive(Default)]
+pub struct MaterialTable {
+    known: HashMap<String, Material>,
+    index: HashMap<String, u32>,
+    used: Vec<Material>,
+    /// What was found and done.
+    pub warnings: Vec<Warning>,
+}
+
+impl MaterialTable {
+    /// Reads the MTL files that `mtllib` statements name; a missing one is a warning.
+    ///
+    /// # Errors
+    /// What [`parse_mtl`] reports, and files that exist but cannot be read.
+    pub fn load(names: &[NameStatement], obj: &Path) -> Result<Self, LoadError> {
+        let mut table = Self::default();
+        let mut read = HashSet::new();
+        let folder = obj.parent().unwrap_or(Path::new(""));
+        for statement in names.iter().filter(|statement| statement.kind == NameKind::Library) {
+            let (files, missing) = library_files(&statement.name, folder);
+            for name in missing {
+                let message = format!("material file '{name}' not found");
+                table.warnings.push(Warning {
+                    file: obj.to_owned(),
+                    line: Some(statement.line as usize),
+                    message,
+                });
+            }
+            for file in files {
+                if read.insert(file.clone()) {
+                    table.add_file(&file)?;
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    fn add_file(&mut self, path: &Path) -> Result<(), LoadError> {
+        let text = fs::read(path).map_err(|source| LoadError::Read { file: path.to_owned(), source })?;
+        let file = parse_mtl(&text, path)?;
+        self.warnings.extend(file.warnings);
+        for material in file.materials {
+            self.known.entry(material.name.clone()).or_insert(material);
+        }
+        Ok(())
+    }
+
+    /// Index of a material for triangles; a name that no MTL file defines gets the default material,
+    /// with a warning where it is first used.
+    pub fn index(&mut self, name: &str, obj: &Path, line: u32) -> u32 {
+        if let Some(&index) = self.index.get(name) {
+            return index;
+        }
+        let index = self.used.len() as u32;
+        let material = match self.known.get(name) {
+            Some(material) => material.clone(),
+            None => {
+                if !name.is_empty() {
+                    let message = format!("material '{name}' is not defined, the default is used");
+                    let line = Some(line as usize);
+                    self.warnings.push(Warning { file: obj.to_owned(), line, message });
+                }
+                Material { name: name.to_owned(), ..Material::default() }
+            }
+        };
+        self.used.push(material);
+        self.index.insert(name.to_owned(), index);
+        index
+    }
+
+    /// The materials that were asked for, in the order of their indices, and the warnings.
+    pub fn into_used(self) -> (Vec<Material>, Vec<Warning>) {
+        (self.used, self.warnings)
+    }
+}
+
+/// Existing files that an `mtllib` statement names, and names that no file has.
+///
+/// Names may contain spaces, escaped with a backslash or not, and one statement may name several files;
+/// so the longest run of words that is a file's name is taken, from left to right.
+fn library_files(statement: &str, folder: &Path) -> (Vec<PathBuf>, Vec<String>) {
+    // NUL stands for an escaped space: no file name holds it.
+    let escaped = statement.replace("\\ ", "\0");
+    let words: Vec<String> = escaped.split_ascii_whitespace().map(|word| word.replace('\0', " ")).collect();
+    let (mut files, mut missing) = (Vec::new(), Vec::new());
+    let mut next = 0;
+    while next < words.len() {
+        let longest = (words.len() - next).min(LONGEST_NAME);
+        let run = |count: usize| existing(&words[next..next + count].join(" "), folder);
+        match (1..=longest).rev().find_map(|count| run(count).map(|file| (file, count))) {
+            Some((file, count)) => {
+                files.push(file);
+                next += count;
+            }
+            None => {
+                missing.push(words[next].clone());
+                next += 1;
+            }
+        }
+    }
+    (files, missing)
+}
+
+/// The file of this name, as written, in quotes, or with Windows separators.
+fn existing(name: &str, folder: &Path) -> Option<PathBuf> {
+    let candidates = [name.to_owned(), name.trim_matches('"').to_owned(), name.replace('\\', "/")];
+    candidates.into_iter().filter(|name| !name.is_empty()).map(|name| folder.join(name)).find(|path| {
+        // A directory of that name is no material file; other obstacles are reported on reading.
+        match fs::metadata(path) {
+            Ok(metadata) => metadata.is_file(),
+            Err(error) => error.kind() == io::ErrorKind::PermissionDenied,
+        }
+    })
+}

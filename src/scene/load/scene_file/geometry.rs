@@ -1,0 +1,219 @@
+//! `[[geometry]]` and `[[material]]`: models, where they stand, and changes to their materials.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3A};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::place::Places;
+use super::values::{Color, Finite, Point, Reflectance, Rotation, ScaleFactors};
+use super::{Gathered, transform};
+use crate::scene::load::{LoadError, MaterialOverride, Model, Selector, load_model};
+use crate::scene::{Instance, Material, TriangleMaterials, TriangleMesh};
+
+/// `[[geometry]]`
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GeometryTable {
+    file: Spanned<PathBuf>,
+    translate: Option<Point>,
+    rotate: Option<Rotation>,
+    scale: Option<ScaleFactors>,
+    matrix: Option<Spanned<[[Finite; 4]; 3]>>,
+}
+
+/// `[[material]]`
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialTable {
+    name: Option<String>,
+    object: Option<String>,
+    file: Option<PathBuf>,
+    diffuse: Option<Reflectance>,
+    specular: Option<Reflectance>,
+    emission: Option<Color>,
+    two_sided: Option<bool>,
+    cull: Option<bool>,
+}
+
+impl MaterialTable {
+    fn selector(&self) -> Option<Selector> {
+        match (&self.name, &self.object) {
+            (Some(name), None) => Some(Selector::Material(name.clone())),
+            (None, Some(object)) => Some(Selector::Object(object.clone())),
+            (None, None) => Some(Selector::All),
+            (Some(_), Some(_)) => None,
+        }
+    }
+
+    fn values(&self) -> MaterialOverride {
+        MaterialOverride {
+            diffuse: self.diffuse.map(|color| color.0),
+            specular: self.specular.map(|color| color.0),
+            emission: self.emission.map(|color| color.0),
+            two_sided: self.two_sided,
+            cull: self.cull,
+        }
+    }
+}
+
+impl GeometryTable {
+    /// Object to world; `None` where the table states no transform.
+    fn to_world(&self, index: usize, places: &Places) -> Result<Option<Affine3A>, LoadError> {
+        let steps = self.translate.is_some() || self.rotate.is_some() || self.scale.is_some();
+        let key = format!("geometry[{index}].matrix");
+        if let Some(matrix) = &self.matrix {
+            if steps {
+                let problem = "excludes translate, rotate and scale";
+                return Err(places.error(&matrix.span(), &key, problem));
+            }
+            let rows = matrix.get_ref().map(|row| row.map(|x| x.0));
+            let column = |i: usize| Vec3A::new(rows[0][i], rows[1][i], rows[2][i]);
+            let linear = Mat3A::from_cols(column(0), column(1), column(2));
+            if !transform::is_invertible(&linear) {
+                return Err(places.error(&matrix.span(), &key, "flattens space (its determinant is 0)"));
+            }
+            return Ok(Some(Affine3A { matrix3: linear, translation: column(3) }));
+        }
+        if !steps {
+            return Ok(None);
+        }
+        let rotation = match &self.rotate {
+            None => Quat::IDENTITY,
+            Some(Rotation::Axes(angles)) => {
+                // The first turn about x: a vector is multiplied by it first.
+                let [x, y, z] = angles.to_array();
+                Quat::from_euler(EulerRot::ZYX, z.to_radians(), y.to_radians(), x.to_radians())
+            }
+            Some(Rotation::AxisAngle { axis, degrees }) => {
+                Quat::from_axis_angle(axis.as_dvec3().normalize().as_vec3(), degrees.to_radians())
+            }
+        };
+        let scale = self.scale.map_or(glam::Vec3::ONE, |scale| scale.0);
+        let translation = self.translate.map_or(glam::Vec3::ZERO, |t| t.0);
+        Ok(Some(Affine3A::from_scale_rotation_translation(scale, rotation, translation)))
+    }
+}
+
+/// Loads the models, each file once, applies the materials' changes, and places them.
+pub fn load(
+    geometry: &[Spanned<GeometryTable>],
+    materials: &[Spanned<MaterialTable>],
+    folder: &Path,
+    places: &Places,
+    gathered: &mut Gathered,
+) -> Result<(), LoadError> {
+    // Keyed by the path in full, so that two spellings of one file are one model.
+    let mut models: BTreeMap<PathBuf, (Model, Vec<Option<Affine3A>>)> = BTreeMap::new();
+    let mut order = Vec::new();
+    for (index, table) in geometry.iter().enumerate() {
+        let to_world = table.get_ref().to_world(index, places)?;
+        let file = &table.get_ref().file;
+        let path = folder.join(file.get_ref());
+        let key = format!("geometry[{index}].file");
+        let readable = fs::File::open(&path).and_then(|opened| {
+            if opened.metadata()?.is_dir() { Err(std::io::ErrorKind::IsADirectory.into()) } else { Ok(()) }
+        });
+        let canonical = readable.and_then(|()| fs::canonicalize(&path));
+        let canonical =
+            canonical.map_err(|error| places.unreadable(&file.span(), &key, path.clone(), error))?;
+        if let Some((_, placements)) = models.get_mut(&canonical) {
+            placements.push(to_world);
+            continue;
+        }
+        let model = load_model(&path)?;
+        order.push(canonical.clone());
+        models.insert(canonical, (model, vec![to_world]));
+    }
+    for (index, table) in materials.iter().enumerate() {
+        let key = format!("material[{index}]");
+        let Some(selector) = table.get_ref().selector() else {
+            return Err(places.error(&table.span(), &key, "name and object exclude each other"));
+        };
+        let only = match &table.get_ref().file {
+            None => None,
+            Some(file) => match fs::canonicalize(folder.join(file)) {
+                Ok(path) if models.contains_key(&path) => Some(path),
+                _ => {
+                    let problem = "is the file of no [[geometry]]";
+                    return Err(places.error(&table.span(), &format!("{key}.file"), problem));
+                }
+            },
+        };
+        let mut found = false;
+        for (path, (model, _)) in &mut models {
+            if only.as_ref().is_none_or(|only| only == path) {
+                found |= model.apply_override(&selector, &table.get_ref().values());
+            }
+        }
+        if !found {
+            let (field, problem) = match &selector {
+                Selector::Material(name) => (".name", format!("no triangle has a material '{name}'")),
+                Selector::Object(name) => (".object", format!("there is no object or group '{name}'")),
+                Selector::All => ("", "there is no material".to_owned()),
+            };
+            return Err(places.error(&table.span(), &format!("{key}{field}"), problem));
+        }
+    }
+    for path in order {
+        if let Some((model, placements)) = models.remove(&path) {
+            gathered.add(model, &placements);
+        }
+    }
+    Ok(())
+}
+
+impl Gathered {
+    /// Adds a model in all its placements.
+    fn add(&mut self, model: Model, placements: &[Option<Affine3A>]) {
+        let scene = &mut self.scene;
+        let first_mesh = scene.meshes.len() as u32;
+        let first_material = scene.materials.len() as u32;
+        scene.materials.extend(model.materials);
+        let mut instances = model.instances;
+        let mut meshes = model.meshes;
+        for mesh in &mut meshes {
+            match &mut mesh.materials {
+                TriangleMaterials::Uniform(material) => *material += first_material,
+                TriangleMaterials::PerTriangle(list) => list.iter_mut().for_each(|m| *m += first_material),
+            }
+        }
+        // Geometry that stands in one place only is moved there, which spares rays the way through an instance.
+        let mut placements = placements.to_vec();
+        if let ([Some(to_world)], true) =
+            (placements.as_slice(), instances.iter().all(|i| i.to_world.is_none()))
+        {
+            let to_world = *to_world;
+            for mesh in &mut meshes {
+                transform::move_mesh(mesh, &to_world);
+            }
+            placements = vec![None];
+        }
+        for placement in &placements {
+            for instance in &mut instances {
+                let to_world = match (placement, instance.to_world) {
+                    (None, own) => own,
+                    (Some(outer), None) => Some(*outer),
+                    (Some(outer), Some(inner)) => Some(*outer * inner),
+                };
+                scene.instances.push(Instance { mesh: first_mesh + instance.mesh, to_world });
+            }
+        }
+        scene.meshes.extend(meshes.into_iter().map(Arc::<TriangleMesh>::new));
+        scene.lights.extend(model.lights);
+        self.cameras.extend(model.cameras);
+        self.skipped.add(&model.skipped);
+        self.warnings.extend(model.warnings);
+    }
+
+    /// Material 0 exists in every scene.
+    pub fn ensure_material(&mut self) {
+        if self.scene.materials.is_empty() {
+            self.scene.materials.push(Material::default());
+        }
+    }
+}

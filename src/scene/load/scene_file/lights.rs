@@ -1,0 +1,153 @@
+//! `[[light]]`, `[[light_box]]`, `[[light_grid]]`, and the falloff.
+
+use glam::Vec3;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::place::Places;
+use super::values::{Color, Count, Fraction, NonNegative, Point};
+use crate::scene::load::LoadError;
+use crate::scene::random::SplitMix64;
+use crate::scene::{Falloff, PointLight};
+
+/// Lights that one table may lay out.
+const MAX_LIGHTS: u32 = 1_000_000;
+
+/// `[[light]]`
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightTable {
+    position: Point,
+    intensity: Color,
+}
+
+/// `[[light_box]]`
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightBoxTable {
+    min: Point,
+    max: Point,
+    count: Count<MAX_LIGHTS>,
+    #[serde(default)]
+    seed: u32,
+    intensity: Option<Color>,
+    total_intensity: Option<Color>,
+    color_variation: Option<Fraction>,
+}
+
+/// `[[light_grid]]`
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightGridTable {
+    min: Point,
+    max: Point,
+    counts: [Count<MAX_LIGHTS>; 3],
+    intensity: Option<Color>,
+    total_intensity: Option<Color>,
+}
+
+/// `falloff`
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FalloffName {
+    Linear,
+    InverseSquare,
+    None,
+}
+
+/// φ1: `default` unless `falloff` or its constant are given; `None` where the two do not go together.
+pub fn falloff(
+    default: Falloff,
+    name: Option<FalloffName>,
+    constant: Option<NonNegative>,
+) -> Option<Falloff> {
+    let falloff = match name {
+        None => default,
+        Some(FalloffName::Linear) => Falloff::default(),
+        Some(FalloffName::InverseSquare) => Falloff::InverseSquare,
+        Some(FalloffName::None) => Falloff::None,
+    };
+    match (falloff, constant) {
+        (falloff, None) => Some(falloff),
+        (Falloff::Linear { .. }, Some(constant)) => Some(Falloff::Linear { constant: constant.0 }),
+        _ => None,
+    }
+}
+
+impl LightTable {
+    /// The light.
+    pub fn light(&self) -> PointLight {
+        PointLight { position: self.position.0, intensity: self.intensity.0 }
+    }
+}
+
+/// E_i of one of `count` lights.
+fn each(
+    intensity: Option<Color>,
+    total: Option<Color>,
+    count: u32,
+    error: impl Fn(&str) -> LoadError,
+) -> Result<Vec3, LoadError> {
+    match (intensity, total) {
+        (Some(each), None) => Ok(each.0),
+        (None, Some(total)) => Ok(total.0 / count as f32),
+        _ => Err(error("exactly one of intensity and total_intensity is required")),
+    }
+}
+
+fn check_box(min: Vec3, max: Vec3, error: impl Fn(&str) -> LoadError) -> Result<(), LoadError> {
+    if !(max - min).is_finite() {
+        return Err(error("the box from min to max is too large"));
+    }
+    if min.cmple(max).all() { Ok(()) } else { Err(error("min must not exceed max in any component")) }
+}
+
+impl LightBoxTable {
+    /// Lights at random positions: per light, x, y and z are drawn, then three factors of the colour
+    /// if that varies.
+    pub fn lights(
+        table: &Spanned<Self>,
+        index: usize,
+        places: &Places,
+    ) -> Result<impl Iterator<Item = PointLight> + use<>, LoadError> {
+        let error = |problem: &str| places.error(&table.span(), &format!("light_box[{index}]"), problem);
+        let table = table.get_ref();
+        let (min, max) = (table.min.0, table.max.0);
+        check_box(min, max, error)?;
+        let each = each(table.intensity, table.total_intensity, table.count.0, error)?;
+        let variation = table.color_variation.map(|fraction| fraction.0).filter(|&fraction| fraction > 0.0);
+        let mut random = SplitMix64::new(u64::from(table.seed));
+        Ok((0..table.count.0).map(move |_| {
+            let position = random.in_box(min, max);
+            let tint =
+                variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
+            PointLight { position, intensity: each * tint }
+        }))
+    }
+}
+
+impl LightGridTable {
+    /// Lights at the centres of the cells that the box is divided into; x runs fastest, z slowest.
+    pub fn lights(
+        table: &Spanned<Self>,
+        index: usize,
+        places: &Places,
+    ) -> Result<impl Iterator<Item = PointLight> + use<>, LoadError> {
+        let error = |problem: &str| places.error(&table.span(), &format!("light_grid[{index}]"), problem);
+        let table = table.get_ref();
+        let (min, max) = (table.min.0, table.max.0);
+        check_box(min, max, error)?;
+        let [nx, ny, nz] = table.counts.map(|count| count.0);
+        let count = u64::from(nx) * u64::from(ny) * u64::from(nz);
+        let Some(count) = u32::try_from(count).ok().filter(|&count| count <= MAX_LIGHTS) else {
+            return Err(error(&format!("counts make more than {MAX_LIGHTS} lights")));
+        };
+        let each = each(table.intensity, table.total_intensity, count, error)?;
+        let cells = Vec3::new(nx as f32, ny as f32, nz as f32);
+        Ok((0..count).map(move |i| {
+            let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
+            let position = min + (max - min) * ((cell + 0.5) / cells);
+            PointLight { position, intensity: each }
+        }))
+    }
+}

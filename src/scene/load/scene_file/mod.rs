@@ -1,0 +1,132 @@
+//! The TOML scene file, described for users in docs/scene-format.md.
+//!
+//! One module per table: a plain struct that mirrors the table, and the function that maps it onto the
+//! scene or the settings. Unknown keys are refused everywhere; ranges are checked by the value types.
+
+mod camera;
+mod geometry;
+mod light_mesh;
+mod lights;
+mod place;
+mod points;
+mod render;
+mod transform;
+mod values;
+
+use std::fs;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use self::camera::CameraTable;
+use self::geometry::{GeometryTable, MaterialTable};
+use self::light_mesh::LightMeshTable;
+use self::lights::{FalloffName, LightBoxTable, LightGridTable, LightTable};
+use self::place::Places;
+use self::render::{PresetName, RenderTable};
+use self::values::{Color, NonNegative};
+use super::{LoadError, Skipped, Warning};
+use crate::scene::{Camera, Falloff, Scene};
+use crate::settings::Settings;
+
+/// A scene, and how its file wants it rendered.
+pub struct LoadedScene {
+    /// The scene.
+    pub scene: Scene,
+    /// The scene file's camera first, then those of its models; at least one.
+    pub cameras: Vec<Camera>,
+    /// The defaults with the file's settings in their place.
+    pub settings: Settings,
+    /// Elements of the models that were left out.
+    pub skipped: Skipped,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// The file's tables.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneTable {
+    background: Option<Color>,
+    preset: Option<PresetName>,
+    falloff: Option<FalloffName>,
+    falloff_constant: Option<Spanned<NonNegative>>,
+    camera: Spanned<CameraTable>,
+    #[serde(default)]
+    render: RenderTable,
+    #[serde(default)]
+    light_mesh: LightMeshTable,
+    geometry: Vec<Spanned<GeometryTable>>,
+    #[serde(default)]
+    material: Vec<Spanned<MaterialTable>>,
+    #[serde(default)]
+    light: Vec<LightTable>,
+    #[serde(default)]
+    light_box: Vec<Spanned<LightBoxTable>>,
+    #[serde(default)]
+    light_grid: Vec<Spanned<LightGridTable>>,
+}
+
+/// What tables and models add up to.
+#[derive(Default)]
+struct Gathered {
+    scene: Scene,
+    cameras: Vec<Camera>,
+    skipped: Skipped,
+    warnings: Vec<Warning>,
+}
+
+/// Reads a TOML scene file and the models that it names, which lie relative to it.
+///
+/// # Errors
+/// The first thing that is wrong, with file, line and key.
+pub fn load_scene_file(path: &Path) -> Result<LoadedScene, LoadError> {
+    let read_error = |source| LoadError::Read { file: path.to_owned(), source };
+    let bytes = fs::read(path).map_err(read_error)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
+        LoadError::Line { file: path.to_owned(), line, problem: "is not UTF-8 text".to_owned() }
+    })?;
+    load_scene_text(&text, path)
+}
+
+/// Reads scene-file text; `path` names it in messages, and models are looked for beside it.
+///
+/// # Errors
+/// As [`load_scene_file`].
+pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError> {
+    let places = Places::new(path, text);
+    let table: SceneTable = toml::from_str(text).map_err(|error| places.parse_error(&error))?;
+
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut settings = Settings::default();
+    let mut falloff = Falloff::default();
+    if let Some(preset) = table.preset {
+        preset.apply(&mut settings, &mut falloff);
+    }
+    table.render.apply(&mut settings, &places)?;
+    table.light_mesh.apply(&mut settings.light_mesh, folder, &places)?;
+
+    let mut gathered = Gathered::default();
+    gathered.cameras.push(CameraTable::camera(&table.camera, &places)?);
+    let constant = table.falloff_constant.as_ref().map(|constant| *constant.get_ref());
+    gathered.scene.falloff = lights::falloff(falloff, table.falloff, constant).ok_or_else(|| {
+        let span = table.falloff_constant.as_ref().map(Spanned::span).unwrap_or_default();
+        places.error(&span, "falloff_constant", "needs falloff = \"linear\"")
+    })?;
+    gathered.scene.background = table.background.map_or(glam::Vec3::ZERO, |color| color.0);
+    gathered.scene.lights.extend(table.light.iter().map(LightTable::light));
+    for (index, light_box) in table.light_box.iter().enumerate() {
+        gathered.scene.lights.extend(LightBoxTable::lights(light_box, index, &places)?);
+    }
+    for (index, grid) in table.light_grid.iter().enumerate() {
+        gathered.scene.lights.extend(LightGridTable::lights(grid, index, &places)?);
+    }
+
+    geometry::load(&table.geometry, &table.material, folder, &places, &mut gathered)?;
+    gathered.ensure_material();
+    let Gathered { scene, cameras, skipped, warnings } = gathered;
+    Ok(LoadedScene { scene, cameras, settings, skipped, warnings })
+}

@@ -1,0 +1,84 @@
+//! `[render]`, and `preset`.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::place::Places;
+use super::values::{Count, Fraction, Stops};
+use crate::scene::Falloff;
+use crate::scene::load::LoadError;
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Settings};
+
+/// Pixels that a picture may have.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// `[render]`
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderTable {
+    integrator: Option<IntegratorName>,
+    resolution: Option<Spanned<[Count<65_536>; 2]>>,
+    spp: Option<Count<65_536>>,
+    max_depth: Option<Count<1_000>>,
+    weight_threshold: Option<Fraction>,
+    exposure: Option<Stops>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum IntegratorName {
+    LightMesh,
+    Conventional,
+}
+
+/// `preset`
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresetName {
+    Physical,
+}
+
+impl PresetName {
+    /// Changes the defaults; keys that are given still count.
+    pub fn apply(self, settings: &mut Settings, falloff: &mut Falloff) {
+        match self {
+            // Spec §12.
+            Self::Physical => {
+                *falloff = Falloff::InverseSquare;
+                settings.lambertian = true;
+                settings.light_mesh.estimator = Estimator::PerLight;
+                settings.light_mesh.indirect = Some(IndirectSettings {
+                    form: IndirectForm::Directional,
+                    bounces: 16,
+                    ..IndirectSettings::default()
+                });
+            }
+        }
+    }
+}
+
+impl RenderTable {
+    /// Puts what is given in place of the defaults.
+    pub fn apply(&self, settings: &mut Settings, places: &Places) -> Result<(), LoadError> {
+        if let Some(resolution) = &self.resolution {
+            let [width, height] = resolution.get_ref().map(|count| count.0);
+            if u64::from(width) * u64::from(height) > MAX_PIXELS {
+                let problem = format!("{width} × {height} is more than {MAX_PIXELS} pixels");
+                return Err(places.error(&resolution.span(), "render.resolution", problem));
+            }
+            settings.resolution = (width, height);
+        }
+        if let Some(integrator) = self.integrator {
+            settings.integrator = match integrator {
+                IntegratorName::LightMesh => Integrator::LightMesh,
+                IntegratorName::Conventional => Integrator::Conventional,
+            };
+        }
+        settings.samples_per_pixel = self.spp.map_or(settings.samples_per_pixel, |count| count.0);
+        settings.max_depth = self.max_depth.map_or(settings.max_depth, |count| count.0);
+        settings.weight_threshold =
+            self.weight_threshold.map_or(settings.weight_threshold, |weight| weight.0);
+        settings.exposure = self.exposure.map_or(settings.exposure, |stops| stops.0);
+        Ok(())
+    }
+}
