@@ -1,3 +1,7 @@
 //! The `lightmesh` program.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lightmesh::cli::main()
+}

@@ -3,10 +3,16 @@
 //! Backends are chosen at run time, once per render; everything inside is generic over [`Accel`], so
 //! that the hot loops dispatch statically.
 
+mod backend;
+mod brute_force;
+pub mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
 mod ray;
 
+pub use backend::{Backend, BackendChoice, BackendError, Chosen};
+pub use brute_force::BruteForceAccel;
+pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]
 pub use embree::{EmbreeAccel, EmbreeError};
 pub use ray::*;

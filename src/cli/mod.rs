@@ -1,4 +1,75 @@
-//! The subcommands of the program, one file each.
+//! The program's command line: one file per subcommand.
 
 pub mod compare;
 pub mod generate;
+mod progress;
+pub mod render;
+mod stats_file;
+
+use std::io::{self, ErrorKind, Write};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Renders large triangle scenes with many lights by light meshes.
+#[derive(Debug, Parser)]
+#[command(name = "lightmesh", version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a scene file to a picture.
+    Render(Box<render::RenderArgs>),
+    /// Write a procedural scene.
+    Generate(generate::GenerateArgs),
+    /// Measure how far a picture is from a reference.
+    Compare(compare::CompareArgs),
+}
+
+/// Exit code of wrong usage; clap's own.
+const USAGE: u8 = 2;
+
+/// Runs the program: parses the command line, runs the subcommand, reports an error once.
+///
+/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A closed pipe behind --help is not an error.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { USAGE } else { 0 });
+        }
+    };
+    let mut out = io::stdout().lock();
+    let result = match &cli.command {
+        Command::Render(args) => render::run(args).map_err(anything),
+        Command::Generate(args) => generate::run(args).map_err(anything),
+        Command::Compare(args) => match compare::run(args, &mut out) {
+            Ok(compare::Verdict::Passed) => Ok(()),
+            Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,
+            Err(compare::CompareError::Print(error)) => Err(Box::new(error) as Box<dyn std::error::Error>),
+            Err(error) => Err(anything(error)),
+        },
+    };
+    match result.and_then(|()| out.flush().map_err(anything)) {
+        Ok(()) => ExitCode::SUCCESS,
+        // Whoever reads the output has seen enough.
+        Err(error) if is_broken_pipe(&*error) => ExitCode::SUCCESS,
+        Err(error) => {
+            let _ = writeln!(io::stderr(), "lightmesh: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn anything(error: impl std::error::Error + 'static) -> Box<dyn std::error::Error> {
+    Box::new(error)
+}
+
+fn is_broken_pipe(error: &(dyn std::error::Error + 'static)) -> bool {
+    error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
+}

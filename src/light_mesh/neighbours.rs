@@ -2,6 +2,10 @@
 
 use glam::Vec3;
 
+/// Share of R over which smooth weights rise from 0 at the plane of the hemisphere: without it points would enter and
+/// leave with a step wherever the normal turns.
+const RAMP: f32 = 0.25;
+
 /// Region of space whose mesh points make up D_y: a ball, or the half of it in front of a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
@@ -12,6 +16,7 @@ pub struct Ball {
     normal: Option<Vec3>,
     smooth: bool,
     inverse_radius_squared: f32,
+    inverse_ramp: f32,
 }
 
 impl Ball {
@@ -19,7 +24,9 @@ impl Ball {
     /// front of the plane through its centre; `smooth` for weights that fall to 0 at R.
     #[inline(always)]
     pub fn new(center: Vec3, normal: Option<Vec3>, radius: f32, smooth: bool) -> Self {
-        Self { center, radius, normal, smooth, inverse_radius_squared: 1.0 / (radius * radius) }
+        let inverse_radius_squared = 1.0 / (radius * radius);
+        let inverse_ramp = 1.0 / (RAMP * radius);
+        Self { center, radius, normal, smooth, inverse_radius_squared, inverse_ramp }
     }
 
     /// Whether a point is on the admitted side of the plane.
@@ -28,13 +35,20 @@ impl Ball {
         self.normal.is_none_or(|n| n.dot(point - self.center) >= 0.0)
     }
 
-    /// Weight of a point: 1, or (1 − r²/R²)² if smooth; `None` outside.
+    /// Weight of a point: 1, or if smooth (1 − r²/R²)² times a ramp that starts at the plane; `None` outside.
     #[inline(always)]
     pub fn weight(&self, point: Vec3) -> Option<f32> {
         let d = point - self.center;
         let falloff = 1.0 - d.length_squared() * self.inverse_radius_squared;
-        let inside = falloff > 0.0 && self.normal.is_none_or(|n| n.dot(d) >= 0.0);
-        inside.then_some(if self.smooth { falloff * falloff } else { 1.0 })
+        let height = self.normal.map_or(f32::INFINITY, |n| n.dot(d));
+        if falloff <= 0.0 || height < 0.0 {
+            return None;
+        }
+        if !self.smooth {
+            return Some(1.0);
+        }
+        let weight = falloff * falloff * (height * self.inverse_ramp).min(1.0);
+        (weight > 0.0).then_some(weight)
     }
 }
 

@@ -1,0 +1,132 @@
+//! The choice of a backend at run time.
+
+use std::fmt;
+
+use super::{BruteForceAccel, BvhAccel, BvhError};
+#[cfg(feature = "embree")]
+use super::{EmbreeAccel, EmbreeError};
+use crate::scene::Scene;
+
+/// What the user asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum BackendChoice {
+    /// Embree where it is installed, the pure-Rust BVH elsewhere.
+    #[default]
+    Auto,
+    /// Embree; an error where there is none.
+    Embree,
+    /// The pure-Rust BVH.
+    Bvh,
+    /// A loop over all triangles, for tests.
+    BruteForce,
+}
+
+/// An acceleration structure of one of the backends.
+pub enum Backend {
+    /// Debian's Embree.
+    #[cfg(feature = "embree")]
+    Embree(EmbreeAccel),
+    /// The pure-Rust BVH.
+    Bvh(BvhAccel),
+    /// A loop over all triangles.
+    BruteForce(BruteForceAccel),
+}
+
+/// Why no acceleration structure could be had.
+#[derive(Debug, thiserror::Error)]
+pub enum BackendError {
+    /// Embree was asked for, and either isn't there or failed.
+    #[cfg(feature = "embree")]
+    #[error("backend embree: {0}")]
+    Embree(#[from] EmbreeError),
+    /// Embree was asked for from a build without it.
+    #[cfg(not(feature = "embree"))]
+    #[error("backend embree: this build has no Embree support; build with the default features")]
+    NoEmbreeSupport,
+    /// The BVH could not be built.
+    #[error("backend bvh: {0}")]
+    Bvh(#[from] BvhError),
+}
+
+/// Runs `$body` with `$accel` bound to the backend's own type, so that everything within is dispatched statically.
+#[macro_export]
+macro_rules! with_accel {
+    ($backend:expr, $accel:ident => $body:expr) => {
+        match $backend {
+            #[cfg(feature = "embree")]
+            $crate::accel::Backend::Embree($accel) => $body,
+            $crate::accel::Backend::Bvh($accel) => $body,
+            $crate::accel::Backend::BruteForce($accel) => $body,
+        }
+    };
+}
+
+/// A backend, and what the user should know about the choice.
+pub struct Chosen {
+    /// The acceleration structure.
+    pub backend: Backend,
+    /// Why `auto` did not take Embree.
+    pub notice: Option<String>,
+}
+
+impl Backend {
+    /// Builds the acceleration structure of a scene.
+    ///
+    /// # Errors
+    /// Embree asked for by name and not to be had, or a failed build. `auto` falls back only where no Embree
+    /// library can be used at all; one that fails on this scene is an error.
+    pub fn build(choice: BackendChoice, scene: &Scene) -> Result<Chosen, BackendError> {
+        let plain = |backend| Ok(Chosen { backend, notice: None });
+        match choice {
+            BackendChoice::Bvh => plain(Self::Bvh(BvhAccel::build(scene)?)),
+            BackendChoice::BruteForce => plain(Self::BruteForce(BruteForceAccel::new(scene))),
+            #[cfg(feature = "embree")]
+            BackendChoice::Embree => plain(Self::Embree(EmbreeAccel::build(scene)?)),
+            #[cfg(feature = "embree")]
+            BackendChoice::Auto => match EmbreeAccel::build(scene) {
+                Ok(accel) => plain(Self::Embree(accel)),
+                // A library that the user named has to work.
+                Err(EmbreeError::Library(cause)) if std::env::var_os("EMBREE_LIB").is_none() => {
+                    let notice = format!(
+                        "{cause}; using the built-in BVH, which is slower. To use Embree, install the package \
+                         libembree3-3 (Debian 12) or libembree4-4 (Debian 13)"
+                    );
+                    Ok(Chosen { backend: Self::Bvh(BvhAccel::build(scene)?), notice: Some(notice) })
+                }
+                Err(error) => Err(error.into()),
+            },
+            #[cfg(not(feature = "embree"))]
+            BackendChoice::Embree => Err(BackendError::NoEmbreeSupport),
+            #[cfg(not(feature = "embree"))]
+            BackendChoice::Auto => {
+                let notice = "this build has no Embree support; using the slower built-in BVH".to_owned();
+                Ok(Chosen { backend: Self::Bvh(BvhAccel::build(scene)?), notice: Some(notice) })
+            }
+        }
+    }
+
+    /// Name as on the command line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(_) => "embree",
+            Self::Bvh(_) => "bvh",
+            Self::BruteForce(_) => "brute-force",
+        }
+    }
+
+    /// Version of the library behind it.
+    pub fn version(&self) -> String {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(accel) => accel.version(),
+            _ => env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+}
+
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.name(), self.version())
+    }
+}

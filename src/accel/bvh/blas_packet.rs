@@ -1,0 +1,239 @@
+//! Groups of rays against the leaves of a tree of triangles.
+
+use crate::accel::LaneMask;
+
+use super::blas::{Blas, Nearest};
+use super::lanes::Lanes;
+use super::node::{TriangleBlock, WIDTH};
+use super::packet::{Group, PacketRays};
+use super::traverse::{any_hit, nearest_hit};
+use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
+use super::triangle::{Distances, EdgeTest, test_edges};
+
+impl Blas {
+    /// The lanes of a packet that are blocked.
+    #[inline(always)]
+    pub fn occluded_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK: usize>(
+        &self,
+        (wide, narrow): (K, S),
+        rays: &PacketRays<W>,
+        active: LaneMask,
+    ) -> LaneMask {
+        let mut blocked = 0;
+        let mut remaining = active & rays.active;
+        let mut stack = [0; STACK];
+        while remaining != 0 {
+            let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
+            remaining &= !group.lanes;
+            blocked |= any_hit_packet::<K, S, W, STACK>(
+                &self.tree,
+                (wide, narrow),
+                rays,
+                &group,
+                #[inline(always)]
+                |visit| match visit {
+                    Visit::Leaf(leaf, lanes) => {
+                        self.leaf_occluded((wide, narrow), rays, &group, &self.blocks[leaf], lanes)
+                    }
+                    Visit::Alone(start, lane) => {
+                        let ray = rays.single(&group, lane);
+                        let hit = any_hit(
+                            &self.tree,
+                            narrow,
+                            &ray,
+                            start,
+                            &mut stack,
+                            #[inline(always)]
+                            |leaf| self.occluded_by_block(narrow, &self.blocks[leaf], &ray),
+                        );
+                        u32::from(hit) << lane
+                    }
+                },
+            );
+        }
+        blocked
+    }
+
+    /// Nearest hits of a packet: lowers `t_far` and sets `nearest` of lanes that hit.
+    #[inline(always)]
+    pub fn intersect_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK: usize>(
+        &self,
+        (wide, narrow): (K, S),
+        rays: &mut PacketRays<W>,
+        active: LaneMask,
+        nearest: &mut [Nearest; W],
+    ) {
+        let mut remaining = active & rays.active;
+        let mut stack = [0; STACK];
+        while remaining != 0 {
+            let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
+            remaining &= !group.lanes;
+            nearest_hit_packet::<K, S, W, STACK>(
+                &self.tree,
+                (wide, narrow),
+                rays,
+                &group,
+                #[inline(always)]
+                |visit, rays| match visit {
+                    Visit::Leaf(leaf, lanes) => {
+                        self.leaf_nearest((wide, narrow), rays, &group, &self.blocks[leaf], lanes, nearest);
+                    }
+                    Visit::Alone(start, lane) => {
+                        let ray = rays.single(&group, lane);
+                        let best = &mut nearest[lane % W];
+                        nearest_hit(
+                            &self.tree,
+                            narrow,
+                            &ray,
+                            start,
+                            &mut stack,
+                            ray.t_far,
+                            #[inline(always)]
+                            |leaf| {
+                                self.intersect_block(narrow, &self.blocks[leaf], &ray, best);
+                                best.hit.t
+                            },
+                        );
+                        rays.t_far[lane % W] = best.hit.t;
+                    }
+                },
+            );
+        }
+    }
+
+    #[inline(always)]
+    fn leaf_occluded<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
+        &self,
+        (wide, narrow): (K, S),
+        rays: &PacketRays<W>,
+        group: &Group<W>,
+        block: &TriangleBlock,
+        lanes: LaneMask,
+    ) -> LaneMask {
+        let mut blocked = 0;
+        let used = block.used();
+        if lanes.count_ones() <= used.count_ones() {
+            let mut left = lanes;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let hit = self.occluded_by_block(narrow, block, &rays.single(group, lane));
+                blocked |= u32::from(hit) << lane;
+            }
+            return blocked;
+        }
+        let mut triangles = used;
+        while triangles != 0 && lanes & !blocked != 0 {
+            let triangle = triangles.trailing_zeros() as usize % WIDTH;
+            triangles &= triangles - 1;
+            let Some((edges, distances)) =
+                test_triangle(wide, rays, group, block, triangle, lanes & !blocked)
+            else {
+                continue;
+            };
+            if !self.has_cutouts {
+                blocked |= distances.hits;
+            }
+            let mut hits = (distances.hits | distances.undecided) & !blocked;
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize % W;
+                hits &= hits - 1;
+                let hit = if distances.undecided >> lane & 1 != 0 {
+                    edges.exact(wide, lane, group.shear[2][lane], rays.t_near[lane], rays.t_far[lane])
+                } else {
+                    Some(distances.hit(lane))
+                };
+                if hit.is_some_and(|hit| self.is_opaque(block.ids[triangle], &hit)) {
+                    blocked |= 1 << lane;
+                }
+            }
+        }
+        blocked
+    }
+
+    #[inline(always)]
+    fn leaf_nearest<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
+        &self,
+        (wide, narrow): (K, S),
+        rays: &mut PacketRays<W>,
+        group: &Group<W>,
+        block: &TriangleBlock,
+        lanes: LaneMask,
+        nearest: &mut [Nearest; W],
+    ) {
+        let used = block.used();
+        if lanes.count_ones() <= used.count_ones() {
+            let mut left = lanes;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize % W;
+                left &= left - 1;
+                if self.intersect_block(narrow, block, &rays.single(group, lane), &mut nearest[lane]) {
+                    rays.t_far[lane] = nearest[lane].hit.t;
+                }
+            }
+            return;
+        }
+        let mut triangles = used;
+        while triangles != 0 {
+            let triangle = triangles.trailing_zeros() as usize % WIDTH;
+            triangles &= triangles - 1;
+            let Some((edges, distances)) = test_triangle(wide, rays, group, block, triangle, lanes) else {
+                continue;
+            };
+            let mut hits = distances.hits | distances.undecided;
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize % W;
+                hits &= hits - 1;
+                let hit = if distances.undecided >> lane & 1 != 0 {
+                    edges.exact(wide, lane, group.shear[2][lane], rays.t_near[lane], rays.t_far[lane])
+                } else {
+                    Some(distances.hit(lane))
+                };
+                let id = block.ids[triangle];
+                if let Some(hit) = hit
+                    && self.is_opaque(id, &hit)
+                    && nearest[lane].offer(hit, id)
+                {
+                    rays.t_far[lane] = hit.t;
+                }
+            }
+        }
+    }
+}
+
+/// One triangle against the rays `lanes` of a group; `None` if it is clear that none hits.
+#[inline(always)]
+fn test_triangle<K: Lanes<W>, const W: usize>(
+    simd: K,
+    rays: &PacketRays<W>,
+    group: &Group<W>,
+    block: &TriangleBlock,
+    triangle: usize,
+    lanes: LaneMask,
+) -> Option<(EdgeTest<K::F>, Distances<W>)> {
+    let corners = block.corners.each_ref().map(
+        #[inline(always)]
+        |corner| {
+            group.axes.map(
+                #[inline(always)]
+                |axis| simd.splat(corner[axis][triangle]),
+            )
+        },
+    );
+    let origin = group.axes.map(
+        #[inline(always)]
+        |axis| simd.load(&rays.origin[axis]),
+    );
+    let shear = group.shear.each_ref().map(
+        #[inline(always)]
+        |s| simd.load(s),
+    );
+    let edges = test_edges::<K, W>(simd, corners, origin, shear);
+    let candidates = edges.candidates & lanes;
+    if candidates == 0 {
+        return None;
+    }
+    let distances =
+        edges.distances::<K, W>(simd, candidates, shear[2], simd.load(&rays.t_near), simd.load(&rays.t_far));
+    Some((edges, distances))
+}
