@@ -4,6 +4,7 @@
 mod camera_rays;
 mod conventional;
 mod paths;
+mod reference;
 mod stats;
 mod tiles;
 
@@ -17,6 +18,7 @@ pub use stats::{MeshCounters, RayCounters, RenderStats, StageSeconds};
 
 use self::conventional::see_lights_from_surface;
 use self::paths::{PathVertex, TilePaths, trace_paths};
+use self::reference::ReferenceIntegrator;
 use self::stats::add_since;
 use self::tiles::{Tile, blocks};
 use crate::accel::Accel;
@@ -101,6 +103,21 @@ pub fn render_conventional<A: Accel>(
     wavefront(accel, scene, camera, settings, &mut integrator, progress)
 }
 
+/// Renders what light meshes of infinite density would give (spec §10); direct light only.
+///
+/// # Errors
+/// As for light meshes of the same settings.
+pub fn render_reference<A: Accel>(
+    accel: &A,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Film, RenderStats), MeshError> {
+    let mut integrator = ReferenceIntegrator::new(accel, scene, settings)?;
+    Ok(wavefront(accel, scene, camera, settings, &mut integrator, progress))
+}
+
 /// Renders with the integrator that the settings name.
 pub fn render<A: Accel>(
     accel: &A,
@@ -111,6 +128,7 @@ pub fn render<A: Accel>(
 ) -> Result<(Film, RenderStats), MeshError> {
     match settings.integrator {
         Integrator::Conventional => Ok(render_conventional(accel, scene, camera, settings, progress)),
+        Integrator::Reference => render_reference(accel, scene, camera, settings, progress),
         Integrator::LightMesh => {
             let mut meshes = LightMeshes::new(scene, settings)?;
             Ok(render_light_mesh(accel, scene, camera, settings, &mut meshes, progress))
