@@ -54,6 +54,9 @@ struct Overrides {
     /// What computes the light at surfaces
     #[arg(long, value_enum)]
     integrator: Option<IntegratorName>,
+    /// With the integrator `reference`: positions around each surface point at which the light is evaluated
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    reference_samples: Option<u32>,
     /// How direct light follows from the light mesh
     #[arg(long, value_enum)]
     estimator: Option<EstimatorName>,
@@ -95,7 +98,7 @@ macro_rules! names {
     };
 }
 
-names!(IntegratorName for Integrator { LightMesh, Conventional });
+names!(IntegratorName for Integrator { LightMesh, Conventional, Reference });
 names!(EstimatorName for Estimator { Paper, Ratio, PerLight, Directional });
 names!(NeighbourhoodName for Neighbourhood { Nearest, Sphere, SmoothSphere });
 names!(ResolveName for Resolve { Average, Trace });
@@ -147,6 +150,7 @@ impl Overrides {
     fn apply(&self, settings: &mut Settings) {
         let mesh = &mut settings.light_mesh;
         set(&mut settings.integrator, self.integrator);
+        set(&mut settings.reference_samples, self.reference_samples);
         set(&mut mesh.estimator, self.estimator);
         set(&mut mesh.resolve, self.resolve);
         set(&mut mesh.points.neighbourhood, self.neighbourhood);
@@ -250,7 +254,7 @@ fn render_to(
     seconds.build = stage.elapsed().as_secs_f64();
 
     let bar = reporter.bar("rendering");
-    let rendered = with_accel!(&chosen.backend, accel => render(accel, &scene, camera, &settings, &bar));
+    let rendered = render(&chosen.backend, &scene, camera, &settings, &bar);
     let (film, stats) = rendered.map_err(|error| RenderError::Mesh { scene: args.scene.clone(), error })?;
     bar.finish();
     seconds.paths = stats.seconds.paths;

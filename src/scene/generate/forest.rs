@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use super::{GenerateError, write_files};
 use crate::scene::random::SplitMix64;
@@ -72,9 +72,9 @@ const LEAVES: [(&str, f32); 3] = [("leaf_dark", 0.5), ("leaf_light", 0.35), ("le
 /// Triangles that make a full tree; more make more trees.
 const TRIANGLES_PER_TREE: u32 = 1_150;
 /// Distance between neighbouring trees' places.
-const CELL: f32 = 4.6;
+const CELL: f32 = 3.7;
 /// Ground beyond the outermost trees' places.
-const MARGIN: f32 = 9.0;
+const MARGIN: f32 = 7.0;
 /// Half the width of an average crown, and half its height.
 const CROWN: Vec2 = Vec2::new(1.9, 1.55);
 /// Height of an average crown's centre.
@@ -168,7 +168,7 @@ impl Plan {
         let spine: Vec<(Vec3, f32)> = (0..=TRUNK.1)
             .map(|ring| {
                 let t = ring as f32 / TRUNK.1 as f32;
-                let radius = size * (0.07 + 0.17 * (1.0 - t) + 0.1 * (1.0 - t).powi(4));
+                let radius = size * (0.07 + 0.17 * (1.0 - t) + 0.1 * (1.0 - t) * (1.0 - t) * (1.0 - t));
                 (root.lerp(centre, t * t * 0.25 + t * 0.75), radius)
             })
             .collect();
@@ -177,7 +177,8 @@ impl Plan {
             let fork = root.lerp(centre, 0.72);
             for branch in 0..BRANCHES.0 {
                 let angle = TAU * (branch as f32 + random.between(-0.3, 0.3)) / BRANCHES.0 as f32;
-                let outward = Vec3::new(angle.cos(), random.between(-0.1, 0.5), angle.sin());
+                let (sin, cos) = sin_cos(angle);
+                let outward = Vec3::new(cos, random.between(-0.1, 0.5), sin);
                 let tip = centre + outward * half * random.between(0.55, 0.75);
                 tube(text, &[(fork, 0.07 * size), (tip, 0.015 * size)], BRANCHES.1);
             }
@@ -207,8 +208,7 @@ impl Plan {
         let Forest { triangles, lights, seed } = self.forest;
         // With linear falloff the light that reaches a point grows with the forest's extent; this keeps
         // the picture's brightness.
-        let total = 1.5 * (half.x + half.y);
-        let (x, z) = (half.x - CELL / 4.0, half.y - CELL / 4.0);
+        let total = 1.6 * (half.x + half.y);
         let front = half.y;
         format!(
             "\
@@ -219,9 +219,9 @@ background = [0.32, 0.45, 0.62]
 falloff = \"linear\"
 
 [camera]
-position = [{eye_x:.2}, 6.6, {eye_z:.2}]
-look_at = [0.0, 2.1, {look_z:.2}]
-vertical_fov = 46.0
+position = [{eye_x:.2}, 7.6, {eye_z:.2}]
+look_at = [0.0, 1.4, {look_z:.2}]
+vertical_fov = 48.0
 
 [render]
 resolution = [600, 600]
@@ -231,25 +231,35 @@ file = \"forest.obj\"
 
 [[light_box]]
 min = [{min_x:.2}, {low:.2}, {min_z:.2}]
-max = [{x:.2}, {high:.2}, {z:.2}]
+max = [{max_x:.2}, {high:.2}, {max_z:.2}]
 count = {lights}
 seed = {seed}
 total_intensity = {total:.2}
 ",
             eye_x = 2.0,
-            eye_z = front + 11.5,
-            look_z = front - 6.5,
-            min_x = -x,
-            min_z = -z,
+            eye_z = front + 8.5,
+            look_z = front - 4.5,
+            // Beyond the front row, so that the sides that the viewer sees are lit.
+            min_x = -half.x,
+            min_z = -half.y,
+            max_x = half.x,
+            max_z = half.y + CELL,
             low = TOP + 0.2,
             high = TOP + 1.2,
         )
     }
 }
 
-/// Gentle waves, at most 0.21 high and low.
+/// Computed in double precision, so that the result in single precision is the same with every system's
+/// library, and a seed the same forest everywhere.
+fn sin_cos(angle: f32) -> (f32, f32) {
+    let (sin, cos) = f64::from(angle).sin_cos();
+    (sin as f32, cos as f32)
+}
+
+/// Gentle waves, at most 0.2 high and low.
 fn ground_height(at: Vec2) -> f32 {
-    0.18 * (0.31 * at.x + 0.7).sin() * (0.27 * at.y).cos() + 0.03 * (0.9 * at.y + 0.6 * at.x).sin()
+    0.2 * sin_cos(0.31 * at.x + 0.7).0 * sin_cos(0.27 * at.y).1
 }
 
 /// Uniform in the unit ball.
@@ -269,7 +279,8 @@ fn tube(text: &mut String, spine: &[(Vec3, f32)], sides: u32) {
     for (centre, radius) in spine {
         for side in 0..sides {
             let angle = TAU * side as f32 / sides as f32;
-            vertex(text, *centre + (u * angle.cos() + v * angle.sin()) * *radius);
+            let (sin, cos) = sin_cos(angle);
+            vertex(text, *centre + (u * cos + v * sin) * *radius);
         }
     }
     let rings = spine.len() as i64;
@@ -291,7 +302,8 @@ fn leaf(text: &mut String, at: Vec3, outward: Vec3, size: f32, whole: bool, rand
     let heading = outward + in_ball(random) * 0.8 + Vec3::NEG_Y * 0.15;
     let along = heading.try_normalize().unwrap_or(Vec3::X);
     let flat = Vec3::Y.cross(along).try_normalize().unwrap_or(Vec3::Z);
-    let across = Quat::from_axis_angle(along, random.between(-0.9, 0.9)) * flat;
+    let (sin, cos) = sin_cos(random.between(-0.9, 0.9));
+    let across = flat * cos + along.cross(flat) * sin;
     let fold = across.cross(along) * (0.25 * width);
     let middle = at + along * (0.45 * length);
     vertex(text, at);

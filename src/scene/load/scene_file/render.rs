@@ -1,12 +1,13 @@
-//! `[render]`.
+//! `[render]`, and `preset`.
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
 use super::values::{Count, Fraction, Stops};
+use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{Integrator, Settings};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Settings};
 
 /// Pixels that a picture may have.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -16,6 +17,7 @@ const MAX_PIXELS: u64 = 1 << 28;
 #[serde(deny_unknown_fields)]
 pub struct RenderTable {
     integrator: Option<IntegratorName>,
+    reference_samples: Option<Count<65_536>>,
     resolution: Option<Spanned<[Count<65_536>; 2]>>,
     spp: Option<Count<65_536>>,
     max_depth: Option<Count<1_000>>,
@@ -28,6 +30,33 @@ pub struct RenderTable {
 enum IntegratorName {
     LightMesh,
     Conventional,
+    Reference,
+}
+
+/// `preset`
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresetName {
+    Physical,
+}
+
+impl PresetName {
+    /// Changes the defaults; keys that are given still count.
+    pub fn apply(self, settings: &mut Settings, falloff: &mut Falloff) {
+        match self {
+            // Spec §12.
+            Self::Physical => {
+                *falloff = Falloff::InverseSquare;
+                settings.lambertian = true;
+                settings.light_mesh.estimator = Estimator::PerLight;
+                settings.light_mesh.indirect = Some(IndirectSettings {
+                    form: IndirectForm::Directional,
+                    bounces: 16,
+                    ..IndirectSettings::default()
+                });
+            }
+        }
+    }
 }
 
 impl RenderTable {
@@ -45,8 +74,11 @@ impl RenderTable {
             settings.integrator = match integrator {
                 IntegratorName::LightMesh => Integrator::LightMesh,
                 IntegratorName::Conventional => Integrator::Conventional,
+                IntegratorName::Reference => Integrator::Reference,
             };
         }
+        settings.reference_samples =
+            self.reference_samples.map_or(settings.reference_samples, |count| count.0);
         settings.samples_per_pixel = self.spp.map_or(settings.samples_per_pixel, |count| count.0);
         settings.max_depth = self.max_depth.map_or(settings.max_depth, |count| count.0);
         settings.weight_threshold =
