@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::paths::PathVertex;
-use super::{BlockIntegrator, RenderStats, ShadeCounters, TilePaths, direct_scale};
+use super::paths::{PathVertex, TilePaths};
+use super::stats::RenderStats;
+use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
 use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayPacket};
 use crate::light_mesh::{
     Ball, Basis, DirectValues, LANES, LightTable, MeshError, MeshPoints, directional, is_inside,

@@ -7,6 +7,7 @@ mod error;
 pub mod mtl;
 pub mod obj;
 mod parts;
+mod points;
 pub mod scene_file;
 mod triangulate;
 
@@ -15,6 +16,7 @@ use std::path::Path;
 
 pub use error::{LoadError, Skipped, Warning};
 pub use parts::{MaterialOverride, Selector};
+pub use points::load_points;
 pub use scene_file::{LoadedScene, load_scene_file};
 
 use super::{Camera, Instance, Material, PointLight, TriangleMesh};
