@@ -77,7 +77,8 @@ impl RenderTable {
                 IntegratorName::Reference => Integrator::Reference,
             };
         }
-        settings.reference_samples = self.reference_samples.map_or(settings.reference_samples, |count| count.0);
+        settings.reference_samples =
+            self.reference_samples.map_or(settings.reference_samples, |count| count.0);
         settings.samples_per_pixel = self.spp.map_or(settings.samples_per_pixel, |count| count.0);
         settings.max_depth = self.max_depth.map_or(settings.max_depth, |count| count.0);
         settings.weight_threshold =
