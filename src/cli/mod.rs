@@ -2,6 +2,8 @@
 
 pub mod bench;
 pub mod compare;
+pub mod gallery;
+mod gallery_page;
 pub mod generate;
 mod progress;
 pub mod render;
@@ -28,6 +30,8 @@ enum Command {
     Generate(generate::GenerateArgs),
     /// Measure speed.
     Bench(bench::BenchArgs),
+    /// Render the scenes of a list and write a page about them.
+    Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArgs),
 }
@@ -55,6 +59,7 @@ pub fn main() -> ExitCode {
             Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
             result => result.map_err(anything),
         },
+        Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {
             Ok(compare::Verdict::Passed) => Ok(()),
             Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,

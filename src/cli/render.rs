@@ -18,7 +18,7 @@ use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Set
 use crate::with_accel;
 
 /// What `render` takes. Flags override the scene file.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct RenderArgs {
     /// Scene file (TOML)
     pub scene: PathBuf,
@@ -48,7 +48,7 @@ pub struct RenderArgs {
 }
 
 /// Settings of the scene file that flags can override.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Instead of the scene file's settings")]
 struct Overrides {
     /// What computes the light at surfaces
