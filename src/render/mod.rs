@@ -96,7 +96,7 @@ pub fn render_conventional<A: Accel>(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> (Film, RenderStats) {
-    let lights = LightTable::new(&scene.lights, scene.falloff);
+    let lights = LightTable::of_scene(scene);
     let mut integrator = ConventionalIntegrator { accel, lights, scale: direct_scale(settings) };
     wavefront(accel, scene, camera, settings, &mut integrator, progress)
 }

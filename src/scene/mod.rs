@@ -16,7 +16,7 @@ use glam::Vec3;
 
 pub use bounds::Bounds;
 pub use camera::Camera;
-pub use light::{Falloff, PointLight};
+pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use surface::SurfacePoint;
