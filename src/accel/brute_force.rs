@@ -95,7 +95,7 @@ fn hit_triangle(ray: &Ray, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
     } else {
         exact(a, b, c, shear_z)?
     };
-    (ray.t_near.max(0.0) <= t && t <= ray.t_far).then_some((t, u, v))
+    (t.is_finite() && ray.t_near.max(0.0) <= t && t <= ray.t_far).then_some((t, u, v))
 }
 
 /// The same in double precision, where an edge function is 0 or too large.

@@ -250,7 +250,7 @@ fn render_to(
     seconds.build = stage.elapsed().as_secs_f64();
 
     let bar = reporter.bar("rendering");
-    let rendered = with_accel!(&chosen.backend, accel => render(accel, &scene, camera, &settings, &bar));
+    let rendered = render(&chosen.backend, &scene, camera, &settings, &bar);
     let (film, stats) = rendered.map_err(|error| RenderError::Mesh { scene: args.scene.clone(), error })?;
     bar.finish();
     seconds.paths = stats.seconds.paths;

@@ -28,9 +28,8 @@ pub struct DirectMesh {
 /// Working memory and counters of one thread while it shades.
 #[derive(Default)]
 pub struct Scratch {
-    pub(super) neighbours: Neighbours,
-    /// D_y: ids, and (slot, weight).
-    pub(super) points: Vec<(u64, (u32, f32))>,
+    /// D_y.
+    pub(super) points: Neighbours,
     /// Occlusion rays traced from surface points to mesh points.
     pub rays: u64,
     /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
@@ -49,23 +48,22 @@ impl Scratch {
         mesh: &MeshPoints,
         surface: &SurfacePoint,
         inside: &[bool],
-        disagree: impl Fn(&[(u64, (u32, f32))]) -> bool,
+        disagree: impl Fn(&[u32]) -> bool,
     ) {
-        self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.neighbours));
-        self.points.clear();
-        self.points.extend(self.neighbours.iter().map(|(id, weight)| (id, (mesh.slot(id), weight))));
+        self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.points));
+        self.points.find_slots(|id| mesh.slot(id));
         match mesh.leaks() {
             Leaks::Allow => {}
             Leaks::Invalidate => {
-                let first = self.points.first().copied();
-                self.points.retain(|&(_, (slot, _))| !inside[slot as usize]);
-                if self.points.is_empty() {
-                    self.points.extend(first);
+                if self.points.slots().iter().any(|&slot| inside[slot as usize])
+                    && !self.points.keep(|_, slot| !inside[slot as usize])
+                {
+                    self.points.keep_first();
                     self.fallbacks += 1;
                 }
             }
             Leaks::Visibility => {
-                if disagree(&self.points) {
+                if disagree(self.points.slots()) {
                     self.rays += keep_visible(accel, mesh, surface, &mut self.points);
                 }
             }
@@ -97,33 +95,33 @@ impl DirectMesh {
     /// Whether some light is seen from one of the points and hidden from another. Where there is none, leaving points
     /// out changes no visibility.
     #[inline(always)]
-    fn disagree(&self, points: &[(u64, (u32, f32))]) -> bool {
+    fn disagree(&self, slots: &[u32]) -> bool {
         let chunks = self.lights.chunks().len();
-        let Some((&(_, (first, _)), rest)) = points.split_first() else { return false };
+        let Some((&first, rest)) = slots.split_first() else { return false };
         let first = self.values.bits(first, chunks);
-        rest.iter().any(|&(_, (slot, _))| self.values.bits(slot, chunks) != first)
+        rest.iter().any(|&slot| self.values.bits(slot, chunks) != first)
     }
 
     /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.
     #[inline(always)]
     pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        scratch.find(accel, &self.points, surface, &self.inside, |points| self.disagree(points));
-        let slots = &scratch.points[..];
-        let scale = 1.0 / slots.iter().fold(0.0, |total, &(_, (_, weight))| total + weight);
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
+        let points = &scratch.points;
+        let scale = 1.0 / points.total_weight();
         match self.estimator {
-            Estimator::PerLight => self.per_light(surface, slots, scale),
+            Estimator::PerLight => self.per_light(surface, points, scale),
             Estimator::Paper => {
-                let [direct, _] = self.mean_direct_light(slots, scale);
+                let [direct, _] = self.mean_direct_light(points, scale);
                 direct * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Ratio => {
-                let [direct, unoccluded] = self.mean_direct_light(slots, scale);
+                let [direct, unoccluded] = self.mean_direct_light(points, scale);
                 let ratio = Vec3::select(unoccluded.cmpgt(Vec3::ZERO), direct / unoccluded, Vec3::ZERO);
                 ratio * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Directional => {
                 let mut sums = [0.0f32; directional::STRIDE];
-                for &(_, (slot, weight)) in slots {
+                for (slot, weight) in points.iter() {
                     for (sum, value) in
                         sums.iter_mut().zip(self.values.values::<{ directional::STRIDE }>(slot))
                     {
@@ -137,11 +135,11 @@ impl DirectMesh {
 
     /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
     #[inline(always)]
-    fn per_light(&self, surface: &SurfacePoint, slots: &[(u64, (u32, f32))], scale: f32) -> Vec3 {
+    fn per_light(&self, surface: &SurfacePoint, points: &Neighbours, scale: f32) -> Vec3 {
         let chunks = self.lights.chunks().len();
         self.lights.illuminate(surface, |chunk| {
             let (mut all, mut any) = (VisibilityBits::MAX, 0);
-            for &(_, (slot, _)) in slots {
+            for &slot in points.slots() {
                 let bits = self.values.bits(slot, chunks)[chunk];
                 all &= bits;
                 any |= bits;
@@ -154,7 +152,7 @@ impl DirectMesh {
                 return Some([1.0; LANES]);
             }
             let mut visible: Lanes = [0.0; LANES];
-            for &(_, (slot, weight)) in slots {
+            for (slot, weight) in points.iter() {
                 let bits = self.values.bits(slot, chunks)[chunk];
                 for (lane, sum) in visible.iter_mut().enumerate() {
                     *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
@@ -175,11 +173,11 @@ impl DirectMesh {
         seen: &mut [VisibilityBits],
         mixed: &mut [VisibilityBits],
     ) {
-        scratch.find(accel, &self.points, surface, &self.inside, |points| self.disagree(points));
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let chunks = self.lights.chunks().len();
         seen.fill(VisibilityBits::MAX);
         mixed.fill(0);
-        for &(_, (slot, _)) in &scratch.points {
+        for &slot in scratch.points.slots() {
             let bits = self.values.bits(slot, chunks);
             for ((all, any), bits) in seen.iter_mut().zip(&mut *mixed).zip(bits) {
                 *all &= bits;
@@ -191,9 +189,9 @@ impl DirectMesh {
 
     /// Ĩ of eq. (3), and the same mean of the unoccluded field.
     #[inline(always)]
-    fn mean_direct_light(&self, slots: &[(u64, (u32, f32))], scale: f32) -> [Vec3; 2] {
+    fn mean_direct_light(&self, points: &Neighbours, scale: f32) -> [Vec3; 2] {
         let mut sums = [0.0f32; 6];
-        for &(_, (slot, weight)) in slots {
+        for (slot, weight) in points.iter() {
             for (sum, value) in sums.iter_mut().zip(self.values.values::<6>(slot)) {
                 *sum += weight * value;
             }

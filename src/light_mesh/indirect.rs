@@ -182,7 +182,7 @@ impl IndirectMesh {
                     self.for_each_hit(scene, x, hits, |_, surface| {
                         if let Some(surface) = surface {
                             mesh.neighbours(&surface, &mut neighbours);
-                            neighbours.iter().for_each(|(id, _)| needed.insert(id));
+                            neighbours.ids().iter().for_each(|&id| needed.insert(id));
                         }
                     });
                 }
@@ -308,11 +308,10 @@ impl IndirectMesh {
     /// radiance that an all-white surface would send back.
     #[inline(always)]
     pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        scratch.find(accel, &self.points, surface, &self.inside, |points| self.disagree(points));
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let mut sums = [0.0f32; directional::STRIDE];
-        let mut total = 0.0;
-        for &(_, (slot, weight)) in &scratch.points {
-            total += weight;
+        let total = scratch.points.total_weight();
+        for (slot, weight) in scratch.points.iter() {
             for (sum, value) in sums.iter_mut().zip(self.value(slot)) {
                 *sum += weight * value;
             }
@@ -336,11 +335,11 @@ impl IndirectMesh {
 
     /// Whether the points see so different amounts of light that a wall may stand between them.
     #[inline(always)]
-    fn disagree(&self, points: &[(u64, (u32, f32))]) -> bool {
+    fn disagree(&self, slots: &[u32]) -> bool {
         /// Ratio of amounts that neighbouring points in one room rarely exceed.
         const CONTRAST: f32 = 1.5;
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
-        for &(_, (slot, _)) in points {
+        for &slot in slots {
             let amount = self.amounts[slot as usize];
             least = least.min(amount);
             most = most.max(amount);

@@ -1,8 +1,8 @@
 //! Regular point sets: positions by arithmetic, neighbours without a search (spec §8).
 
-use glam::{I64Vec3, Vec3};
+use glam::{I64Vec3, IVec3, Vec3};
 
-use super::neighbours::{Ball, Neighbours};
+use super::neighbours::{Ball, Neighbours, ROW};
 use crate::scene::Bounds;
 
 /// Mesh points per brick edge. Values are kept for whole bricks of 4×4×4 points or not at all.
@@ -89,25 +89,42 @@ impl Lattice {
         (brick * 64 + place) as u64
     }
 
-    /// First and last cell of the points within the box y ± r; `None` if there are none.
-    #[inline(always)]
-    fn cells(&self, y: Vec3, r: f32) -> (I64Vec3, I64Vec3) {
-        let first = ((y - r - self.origin) * self.inverse_spacing).ceil().as_i64vec3();
-        let last = ((y + r - self.origin) * self.inverse_spacing).floor().as_i64vec3();
-        (first.max(I64Vec3::ZERO), last.min(self.bricks * EDGE - 1))
-    }
-
     /// The points of the ball, in ascending order of z, y, x.
     #[inline(always)]
     pub fn gather(&self, ball: &Ball, out: &mut Neighbours) {
-        let (first, last) = self.cells(ball.center, ball.radius);
+        // Cells fit 32 bits, since coordinates tell neighbouring points apart.
+        let last_cell = (self.bricks * EDGE - 1).as_ivec3();
+        let first = ((ball.center - ball.radius - self.origin) * self.inverse_spacing).ceil().as_ivec3();
+        let last = ((ball.center + ball.radius - self.origin) * self.inverse_spacing).floor().as_ivec3();
+        let (first, last) = (first.max(IVec3::ZERO), last.min(last_cell));
+        let offset = |cell: i32, axis: usize| {
+            (self.origin[axis] + cell as f32 * self.spacing[axis]) - ball.center[axis]
+        };
         for z in first.z..=last.z {
+            let dz = offset(z, 2);
+            let slab = i64::from(z >> 2) * self.bricks.y;
             for y in first.y..=last.y {
-                for x in first.x..=last.x {
-                    let cell = I64Vec3::new(x, y, z);
-                    if let Some(weight) = ball.weight(self.at(cell)) {
-                        out.push(self.id(cell), weight);
+                let row = ball.row(offset(y, 1), dz);
+                if !ball.reaches(row) {
+                    continue;
+                }
+                let brick = (slab + i64::from(y >> 2)) * self.bricks.x;
+                let place = (y & 1) << 2 | (z & 1) << 3 | (y & 2) << 3 | (z & 2) << 4;
+                let mut begin = first.x;
+                while begin <= last.x {
+                    let mut weights = [0.0; ROW];
+                    for (i, weight) in weights.iter_mut().enumerate() {
+                        *weight = ball.weigh(offset(begin + i as i32, 0), row);
                     }
+                    let count = ((last.x - begin) as usize + 1).min(ROW);
+                    out.push_row(
+                        |i| {
+                            let x = begin + i as i32;
+                            ((brick + i64::from(x >> 2)) * 64 + i64::from(place | x & 3)) as u64
+                        },
+                        &weights[..count],
+                    );
+                    begin += ROW as i32;
                 }
             }
         }
@@ -173,7 +190,7 @@ mod tests {
             let ball = Ball::new(center, normal, 1.0, false);
             let mut found = Neighbours::default();
             lattice.gather(&ball, &mut found);
-            let found: HashSet<u64> = found.iter().map(|(id, _)| id).collect();
+            let found: HashSet<u64> = found.ids().iter().copied().collect();
             let expected: HashSet<u64> = (0..lattice.len())
                 .filter(|&id| {
                     let d = lattice.position(id) - center;

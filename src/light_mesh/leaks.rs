@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::lights::LANES;
+use super::neighbours::Neighbours;
 use super::points::MeshPoints;
 use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
 use crate::scene::{Scene, SurfacePoint};
@@ -45,32 +46,25 @@ pub fn is_inside_by_share(backs: usize, directions: usize) -> bool {
     backs as f32 > INSIDE_SHARE * directions as f32
 }
 
-/// Keeps those of the mesh points `(id, …)` that a surface point sees; returns the number of rays. If it sees none, the
-/// list stays as it is.
-pub fn keep_visible<A: Accel, T: Copy>(
+/// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.
+pub fn keep_visible<A: Accel>(
     accel: &A,
-    points: &MeshPoints,
+    mesh: &MeshPoints,
     surface: &SurfacePoint,
-    list: &mut Vec<(u64, T)>,
+    points: &mut Neighbours,
 ) -> u64 {
     let origin = surface.ray_origin();
-    let mut seen: Vec<(u64, T)> = Vec::with_capacity(list.len());
-    for group in list.chunks(LANES) {
+    let rays = points.ids().len();
+    let mut blocked = Vec::with_capacity(rays);
+    for group in points.ids().chunks(LANES) {
         let mut packet = RayPacket::<LANES>::empty();
-        for (lane, &(id, _)) in group.iter().enumerate() {
-            packet.set_lane(lane, &Ray::between(origin, points.position(id)));
+        for (lane, &id) in group.iter().enumerate() {
+            packet.set_lane(lane, &Ray::between(origin, mesh.position(id)));
         }
         let active = ((1u64 << group.len()) - 1) as u32;
-        let blocked = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
-        for (lane, entry) in group.iter().enumerate() {
-            if blocked >> lane & 1 == 0 {
-                seen.push(*entry);
-            }
-        }
+        let lanes = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+        blocked.extend((0..group.len()).map(|lane| lanes >> lane & 1 == 1));
     }
-    let rays = list.len() as u64;
-    if !seen.is_empty() {
-        *list = seen;
-    }
-    rays
+    points.keep(|index, _| !blocked[index]);
+    rays as u64
 }

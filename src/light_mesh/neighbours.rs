@@ -6,6 +6,9 @@ use glam::Vec3;
 /// leave with a step wherever the normal turns.
 const RAMP: f32 = 0.25;
 
+/// Mesh points of one row of a regular grid that are weighed together: a register of AVX2.
+pub const ROW: usize = 8;
+
 /// Region of space whose mesh points make up D_y: a ball, or the half of it in front of a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
@@ -13,7 +16,10 @@ pub struct Ball {
     pub center: Vec3,
     /// R.
     pub radius: f32,
-    normal: Option<Vec3>,
+    /// Normal of the plane that cuts the ball; 0 for the whole ball.
+    normal: Vec3,
+    /// Height of y over that plane: 0, or huge for the whole ball.
+    height: f32,
     smooth: bool,
     inverse_radius_squared: f32,
     inverse_ramp: f32,
@@ -24,70 +30,164 @@ impl Ball {
     /// front of the plane through its centre; `smooth` for weights that fall to 0 at R.
     #[inline(always)]
     pub fn new(center: Vec3, normal: Option<Vec3>, radius: f32, smooth: bool) -> Self {
-        let inverse_radius_squared = 1.0 / (radius * radius);
-        let inverse_ramp = 1.0 / (RAMP * radius);
-        Self { center, radius, normal, smooth, inverse_radius_squared, inverse_ramp }
+        Self {
+            center,
+            radius,
+            normal: normal.unwrap_or(Vec3::ZERO),
+            height: if normal.is_some() { 0.0 } else { f32::MAX },
+            smooth,
+            inverse_radius_squared: 1.0 / (radius * radius),
+            inverse_ramp: 1.0 / (RAMP * radius),
+        }
     }
 
     /// Whether a point is on the admitted side of the plane.
     #[inline(always)]
     pub fn admits(&self, point: Vec3) -> bool {
-        self.normal.is_none_or(|n| n.dot(point - self.center) >= 0.0)
+        self.normal.dot(point - self.center) + self.height >= 0.0
     }
 
-    /// Weight of a point: 1, or if smooth (1 − r²/R²)² times a ramp that starts at the plane; `None` outside.
+    /// Weight of a point; `None` outside. See [`Ball::weigh`].
     #[inline(always)]
     pub fn weight(&self, point: Vec3) -> Option<f32> {
         let d = point - self.center;
-        let falloff = 1.0 - d.length_squared() * self.inverse_radius_squared;
-        let height = self.normal.map_or(f32::INFINITY, |n| n.dot(d));
-        if falloff <= 0.0 || height < 0.0 {
-            return None;
-        }
-        if !self.smooth {
-            return Some(1.0);
-        }
-        let weight = falloff * falloff * (height * self.inverse_ramp).min(1.0);
+        let weight = self.weigh(d.x, self.row(d.y, d.z));
         (weight > 0.0).then_some(weight)
+    }
+
+    /// What the points of a row along x have in common, at offsets `dy` and `dz` from the centre: the squared distance
+    /// and the height over the plane that y and z contribute.
+    #[inline(always)]
+    pub fn row(&self, dy: f32, dz: f32) -> (f32, f32) {
+        (dy * dy + dz * dz, self.normal.y * dy + self.normal.z * dz + self.height)
+    }
+
+    /// Whether a row comes near enough to have points in the ball.
+    #[inline(always)]
+    pub fn reaches(&self, (distance_squared, _): (f32, f32)) -> bool {
+        distance_squared * self.inverse_radius_squared < 1.0
+    }
+
+    /// Weight of the point at offset `dx` in a row: 1, or if smooth (1 − r²/R²)² times a ramp that starts at the plane;
+    /// 0 outside.
+    #[inline(always)]
+    pub fn weigh(&self, dx: f32, (distance_squared, height): (f32, f32)) -> f32 {
+        let falloff = 1.0 - (dx * dx + distance_squared) * self.inverse_radius_squared;
+        let height = self.normal.x * dx + height;
+        let ramp = height * self.inverse_ramp;
+        let smooth = falloff * falloff * if ramp < 1.0 { ramp } else { 1.0 };
+        let weight = if self.smooth { smooth } else { 1.0 };
+        if falloff > 0.0 && height >= 0.0 { weight } else { 0.0 }
     }
 }
 
-/// Mesh points with weights; the order is fixed by the point set, so that sums never depend on timing.
+/// Mesh points with weights, and slots once they are looked up; the order is fixed by the point set, so that sums never
+/// depend on timing.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     ids: Vec<u64>,
     weights: Vec<f32>,
+    slots: Vec<u32>,
+    count: usize,
 }
 
 impl Neighbours {
     /// Forgets all points.
     #[inline(always)]
     pub fn clear(&mut self) {
-        self.ids.clear();
-        self.weights.clear();
+        self.count = 0;
     }
 
     /// Adds a point.
     #[inline(always)]
     pub fn push(&mut self, id: u64, weight: f32) {
-        self.ids.push(id);
-        self.weights.push(weight);
+        self.push_row(|_| id, &[weight]);
+    }
+
+    /// Adds those of up to [`ROW`] points whose weight is above 0; `id(i)` names point i.
+    ///
+    /// All are written and the end moves past those that count: in a ball's rows a branch would be a coin toss.
+    #[inline(always)]
+    pub fn push_row(&mut self, id: impl Fn(usize) -> u64, weights: &[f32]) {
+        if self.count + ROW > self.ids.len() {
+            let capacity = (self.ids.len() * 2).max(64) + ROW;
+            self.ids.resize(capacity, 0);
+            self.weights.resize(capacity, 0.0);
+        }
+        for (i, &weight) in weights.iter().enumerate().take(ROW) {
+            self.ids[self.count] = id(i);
+            self.weights[self.count] = weight;
+            self.count += usize::from(weight > 0.0);
+        }
     }
 
     /// Adds `first` to all ids.
     pub fn offset_ids(&mut self, first: u64) {
-        self.ids.iter_mut().for_each(|id| *id += first);
+        self.ids[..self.count].iter_mut().for_each(|id| *id += first);
+    }
+
+    /// Looks up the slots.
+    #[inline(always)]
+    pub fn find_slots(&mut self, slot: impl Fn(u64) -> u32) {
+        self.slots.clear();
+        self.slots.extend(self.ids[..self.count].iter().map(|&id| slot(id)));
+    }
+
+    /// Drops the points that don't `pass`, by index and slot, unless none passes; returns whether any did.
+    pub fn keep(&mut self, mut pass: impl FnMut(usize, u32) -> bool) -> bool {
+        let mut kept = 0;
+        for i in 0..self.count {
+            if pass(i, self.slots[i]) {
+                self.ids[kept] = self.ids[i];
+                self.weights[kept] = self.weights[i];
+                self.slots[kept] = self.slots[i];
+                kept += 1;
+            }
+        }
+        if kept > 0 {
+            self.count = kept;
+        }
+        kept > 0
+    }
+
+    /// Leaves the first point alone.
+    pub fn keep_first(&mut self) {
+        self.count = self.count.min(1);
     }
 
     /// Whether there are none.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.ids.is_empty()
+        self.count == 0
     }
 
-    /// Points and weights.
+    /// The points' ids.
     #[inline(always)]
-    pub fn iter(&self) -> impl Iterator<Item = (u64, f32)> + '_ {
-        self.ids.iter().copied().zip(self.weights.iter().copied())
+    pub fn ids(&self) -> &[u64] {
+        &self.ids[..self.count]
+    }
+
+    /// The points' slots, after [`Neighbours::find_slots`].
+    #[inline(always)]
+    pub fn slots(&self) -> &[u32] {
+        &self.slots[..self.count]
+    }
+
+    /// The points' weights, all above 0.
+    #[inline(always)]
+    pub fn weights(&self) -> &[f32] {
+        &self.weights[..self.count]
+    }
+
+    /// Slots and weights, after [`Neighbours::find_slots`].
+    #[inline(always)]
+    pub fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+        self.slots().iter().copied().zip(self.weights().iter().copied())
+    }
+
+    /// Sum of the weights.
+    #[inline(always)]
+    pub fn total_weight(&self) -> f32 {
+        self.weights().iter().sum()
     }
 }

@@ -225,7 +225,7 @@ mod tests {
                 let ball = Ball::new(center, Some(normal), 1.0, true);
                 let mut found = Neighbours::default();
                 set.gather(&ball, &mut found);
-                let found: HashSet<u64> = found.iter().map(|(id, _)| id).collect();
+                let found: HashSet<u64> = found.ids().iter().copied().collect();
                 let expected: HashSet<u64> =
                     (0..set.len()).filter(|&id| ball.weight(set.position(id)).is_some()).collect();
                 assert!(!found.is_empty());

@@ -1,8 +1,12 @@
 //! The conventional tracer (spec §10): one occlusion ray per light at every surface point.
 
-use super::paths::PathVertex;
+use glam::Vec3;
+
+use super::paths::{PathVertex, TilePaths};
+use super::stats::RenderStats;
+use super::wavefront::{BlockIntegrator, ShadeCounters};
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::light_mesh::{LANES, LightTable, VisibilityBits};
+use crate::light_mesh::{LANES, LightTable, VisibilityBits, expand_bits};
 
 /// Traces the occlusion rays from up to 16 surface points to their `undecided` lights, and counts them.
 ///
@@ -10,7 +14,7 @@ use crate::light_mesh::{LANES, LightTable, VisibilityBits};
 /// visible are added to `bits`. Packets run from the points towards one light, which is the best form that
 /// backends have for neighbouring points; lights below a point's horizon cost no ray.
 #[inline(always)]
-pub fn see_lights_from_surface<A: Accel>(
+fn see_lights_from_surface<A: Accel>(
     accel: &A,
     lights: &LightTable,
     vertices: &[PathVertex],
@@ -64,4 +68,63 @@ pub fn see_lights_from_surface<A: Accel>(
         }
     }
     rays
+}
+
+/// Shades with occlusion rays from the surface points to those lights that `decide` leaves open.
+///
+/// `decide(vertex, seen, undecided)` fills in, per chunk, the lights known to be visible and the lights to ask.
+/// Returns the number of rays.
+#[inline(always)]
+pub(super) fn shade_traced<A: Accel>(
+    accel: &A,
+    lights: &LightTable,
+    vertices: &[PathVertex],
+    emit: &mut dyn FnMut(&PathVertex, Vec3),
+    mut decide: impl FnMut(&PathVertex, &mut [VisibilityBits], &mut [VisibilityBits]),
+) -> u64 {
+    let mut rays = 0;
+    let chunks = lights.chunks().len();
+    let mut bits = vec![0; chunks * LANES];
+    let mut undecided = bits.clone();
+    for group in vertices.chunks(LANES) {
+        for (point, vertex) in group.iter().enumerate() {
+            let range = point * chunks..(point + 1) * chunks;
+            decide(vertex, &mut bits[range.clone()], &mut undecided[range]);
+        }
+        rays += see_lights_from_surface(accel, lights, group, &undecided, &mut bits);
+        for (point, vertex) in group.iter().enumerate() {
+            let visible = &bits[point * chunks..];
+            let illumination = lights.illuminate(&vertex.surface, |chunk| {
+                (visible[chunk] != 0).then(|| expand_bits(visible[chunk]))
+            });
+            emit(vertex, illumination);
+        }
+    }
+    rays
+}
+
+/// Shades with all shadow rays traced.
+pub(super) struct ConventionalIntegrator<'a, A> {
+    pub accel: &'a A,
+    pub lights: LightTable,
+    /// What direct light is multiplied by before k_d.
+    pub scale: f32,
+}
+
+impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
+    fn prepare(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
+
+    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
+        pulp::Arch::new().dispatch(|| {
+            let mut scaled = |vertex: &PathVertex, light: Vec3| emit(vertex, light * self.scale);
+            let shadow_rays =
+                shade_traced(self.accel, &self.lights, vertices, &mut scaled, |_, seen, undecided| {
+                    seen.fill(0);
+                    for (bits, chunk) in undecided.iter_mut().zip(self.lights.chunks()) {
+                        *bits = chunk.used;
+                    }
+                });
+            ShadeCounters { shadow_rays, ..ShadeCounters::default() }
+        })
+    }
 }

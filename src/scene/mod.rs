@@ -9,6 +9,7 @@ mod material;
 mod mesh;
 pub mod random;
 mod surface;
+mod texture;
 
 use std::sync::Arc;
 
@@ -20,6 +21,7 @@ pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use surface::SurfacePoint;
+pub use texture::{Texture, TextureMap, Wrap};
 
 /// Everything that is rendered, in world space of any unit of length.
 #[derive(Clone, Default)]

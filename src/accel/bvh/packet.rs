@@ -21,6 +21,16 @@ pub struct PacketRays<const W: usize> {
     kinds: [u8; W],
 }
 
+/// `W` rays as they come.
+#[derive(Clone, Copy)]
+pub struct RawRays<const W: usize> {
+    pub origin: [[f32; W]; 3],
+    pub direction: [[f32; W]; 3],
+    pub t_near: [f32; W],
+    pub t_far: [f32; W],
+    pub active: LaneMask,
+}
+
 /// Lanes of one packet with the same direction signs and the same largest axis.
 #[derive(Clone, Copy)]
 pub struct Group<const W: usize> {
@@ -31,15 +41,10 @@ pub struct Group<const W: usize> {
 }
 
 impl<const W: usize> PacketRays<W> {
-    /// Prepares those rays of `active` that [`SingleRay::new`] would accept.
+    /// Prepares those rays that [`SingleRay::new`] would accept.
     #[inline(always)]
-    pub fn new(
-        origin: [[f32; W]; 3],
-        direction: [[f32; W]; 3],
-        t_near: [f32; W],
-        t_far: [f32; W],
-        active: LaneMask,
-    ) -> Self {
+    pub fn new(raw: &RawRays<W>) -> Self {
+        let RawRays { origin, direction, t_near, t_far, active } = *raw;
         let mut rays = Self {
             origin,
             direction,
@@ -56,16 +61,15 @@ impl<const W: usize> PacketRays<W> {
             let largest = d[0].abs().max(d[1].abs()).max(d[2].abs());
             let near = t_near[lane].max(0.0) + 0.0;
             // x · 0 is 0 for finite x only.
-            let finite =
-                (o[0] + o[1] + o[2]) * 0.0 + (d[0] + d[1] + d[2]) * 0.0 + t_near[lane].min(0.0) * 0.0 == 0.0
-                    || is_fit(o, d, t_near[lane]);
-            let fit = finite & (largest > 0.0) & (near <= t_far[lane]);
+            let finite = (o[0] + o[1] + o[2]) * 0.0 + (d[0] + d[1] + d[2]) * 0.0 == 0.0 || is_finite(o, d);
+            let fit = finite & (largest > 0.0) & !t_near[lane].is_nan() & (near <= t_far[lane]);
             rays.active |= (u32::from(fit) << lane) & active;
             rays.t_near[lane] = near;
+            rays.t_far[lane] = t_far[lane].min(f32::MAX);
             for axis in 0..3 {
-                let reciprocal = safe_reciprocal(d[axis], largest);
+                let (reciprocal, scaled) = safe_reciprocal(o[axis], d[axis], largest);
                 rays.reciprocal[axis][lane] = reciprocal;
-                rays.scaled_origin[axis][lane] = o[axis] * reciprocal;
+                rays.scaled_origin[axis][lane] = scaled;
             }
             let signs = d.map(|d| d.to_bits() >> 31);
             rays.kinds[lane] =
@@ -150,6 +154,6 @@ fn lane_of<const W: usize>(values: &[[f32; W]; 3], lane: usize) -> [f32; 3] {
 
 /// The slow, exact form of the test for finite rays: sums of large finite numbers may overflow.
 #[cold]
-fn is_fit(o: [f32; 3], d: [f32; 3], t_near: f32) -> bool {
-    o.iter().chain(&d).all(|c| c.is_finite()) && !t_near.is_nan()
+fn is_finite(o: [f32; 3], d: [f32; 3]) -> bool {
+    o.iter().chain(&d).all(|c| c.is_finite())
 }

@@ -5,7 +5,7 @@ use crate::accel::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacke
 use super::blas::Nearest;
 use super::lanes::{Lanes, Portable};
 use super::node::WIDTH;
-use super::packet::PacketRays;
+use super::packet::{PacketRays, RawRays};
 use super::ray::SingleRay;
 use super::traverse::{any_hit, nearest_hit};
 use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
@@ -59,11 +59,6 @@ macro_rules! dispatch {
             ),
         }
     };
-}
-
-/// Nearest hits of a packet: what [`Hit`] holds, lane by lane.
-struct PacketHits<const W: usize> {
-    hits: [Option<Hit>; W],
 }
 
 impl BvhAccel {
@@ -191,11 +186,11 @@ impl BvhAccel {
         &self,
         simd: (K, S),
         rays: &mut PacketRays<W>,
-    ) -> PacketHits<W> {
-        let mut found = PacketHits { hits: [None; W] };
+    ) -> [Option<Hit>; W] {
+        let mut found = [None; W];
         let mut nearest = rays.t_far.map(Nearest::none);
         self.fixed.intersect_packet::<K, S, W, STACK>(simd, rays, rays.active, &mut nearest);
-        for (nearest, best) in nearest.iter().zip(&mut found.hits) {
+        for (nearest, best) in nearest.iter().zip(&mut found) {
             self.offer_fixed(nearest, best);
         }
         if self.instances.placed.is_empty() {
@@ -206,7 +201,7 @@ impl BvhAccel {
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
-            let hits = &mut found.hits;
+            let hits = &mut found;
             let mut visit_leaf = |leaf: usize, lanes: LaneMask, rays: &mut PacketRays<W>| {
                 for &number in &self.instances.leaves[leaf] {
                     let Some(placed) = self.instances.placed.get(number as usize) else { break };
@@ -266,7 +261,7 @@ fn transformed<const W: usize>(
             direction[axis][lane] = along[axis];
         }
     }
-    PacketRays::new(origin, direction, rays.t_near, rays.t_far, lanes)
+    PacketRays::new(&RawRays { origin, direction, t_near: rays.t_near, t_far: rays.t_far, active: lanes })
 }
 
 fn offer_placed(nearest: &Nearest, instance: u32, best: &mut Option<Hit>) {
@@ -300,40 +295,45 @@ fn lanes_of<const N: usize, const W: usize>(
     packet: &RayPacket<N>,
     first: usize,
     active: LaneMask,
-) -> PacketRays<W> {
+) -> RawRays<W> {
     let present = if N - first >= W { u32::MAX } else { (1 << (N - first)) - 1 };
-    PacketRays::new(
-        [take(first, &packet.org_x), take(first, &packet.org_y), take(first, &packet.org_z)],
-        [take(first, &packet.dir_x), take(first, &packet.dir_y), take(first, &packet.dir_z)],
-        take(first, &packet.tnear),
-        take(first, &packet.tfar),
-        (active >> first) & present,
-    )
+    RawRays {
+        origin: [take(first, &packet.org_x), take(first, &packet.org_y), take(first, &packet.org_z)],
+        direction: [take(first, &packet.dir_x), take(first, &packet.dir_y), take(first, &packet.dir_z)],
+        t_near: take(first, &packet.tnear),
+        t_far: take(first, &packet.tfar),
+        active: (active >> first) & present,
+    }
 }
 
+// Not generic over the packet's size, so that they are compiled once, in this crate.
 impl BvhAccel {
-    #[inline(always)]
-    fn occluded_part<K: Lanes<W>, S: Lanes<WIDTH>, const N: usize, const W: usize>(
-        &self,
-        simd: (K, S),
-        packet: &RayPacket<N>,
-        active: LaneMask,
-        first: usize,
-    ) -> LaneMask {
-        self.occluded_lanes(simd, &lanes_of::<N, W>(packet, first, active)) << first
+    fn occluded_narrow(&self, raw: &RawRays<WIDTH>) -> LaneMask {
+        dispatch!(self.dispatch, |simd| self.occluded_lanes((simd, simd), &PacketRays::new(raw)))
     }
 
-    #[inline(always)]
-    fn intersect_part<K: Lanes<W>, S: Lanes<WIDTH>, const N: usize, const W: usize>(
-        &self,
-        simd: (K, S),
-        packet: &mut RayHitPacket<N>,
-        active: LaneMask,
-        first: usize,
-    ) {
-        let mut rays = lanes_of::<N, W>(&packet.ray, first, active);
-        let found = self.intersect_lanes(simd, &mut rays);
-        for (lane, hit) in found.hits.iter().enumerate() {
+    fn intersect_narrow(&self, raw: &RawRays<WIDTH>) -> [Option<Hit>; WIDTH] {
+        dispatch!(self.dispatch, |simd| self.intersect_lanes((simd, simd), &mut PacketRays::new(raw)))
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn occluded_wide(&self, simd: pulp::x86::V4, raw: &RawRays<16>) -> LaneMask {
+        simd.vectorize(
+            #[inline(always)]
+            || self.occluded_lanes((simd, simd), &PacketRays::new(raw)),
+        )
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn intersect_wide(&self, simd: pulp::x86::V4, raw: &RawRays<16>) -> [Option<Hit>; 16] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.intersect_lanes((simd, simd), &mut PacketRays::new(raw)),
+        )
+    }
+
+    fn write_hits<const N: usize>(&self, hits: &[Option<Hit>], first: usize, packet: &mut RayHitPacket<N>) {
+        for (lane, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
             let lane = first + lane;
             packet.ray.tfar[lane] = hit.t;
@@ -360,14 +360,13 @@ impl Accel for BvhAccel {
     fn intersect_packet<const N: usize>(&self, active: LaneMask, packet: &mut RayHitPacket<N>, _: Coherence) {
         #[cfg(target_arch = "x86_64")]
         if let (Dispatch::Avx512(simd), 16) = (self.dispatch, N) {
-            return simd.vectorize(
-                #[inline(always)]
-                || self.intersect_part::<_, _, N, 16>((simd, simd), packet, active, 0),
-            );
+            let hits = self.intersect_wide(simd, &lanes_of(&packet.ray, 0, active));
+            return self.write_hits(&hits, 0, packet);
         }
-        dispatch!(self.dispatch, |simd| for first in (0..N).step_by(WIDTH) {
-            self.intersect_part::<_, _, N, WIDTH>((simd, simd), packet, active, first);
-        });
+        for first in (0..N).step_by(WIDTH) {
+            let hits = self.intersect_narrow(&lanes_of(&packet.ray, first, active));
+            self.write_hits(&hits, first, packet);
+        }
     }
 
     fn occluded_packet<const N: usize>(
@@ -378,18 +377,10 @@ impl Accel for BvhAccel {
     ) -> LaneMask {
         #[cfg(target_arch = "x86_64")]
         if let (Dispatch::Avx512(simd), 16) = (self.dispatch, N) {
-            return simd.vectorize(
-                #[inline(always)]
-                || self.occluded_part::<_, _, N, 16>((simd, simd), packet, active, 0),
-            );
+            return self.occluded_wide(simd, &lanes_of(packet, 0, active));
         }
-        dispatch!(self.dispatch, |simd| {
-            let mut blocked = 0;
-            for first in (0..N).step_by(WIDTH) {
-                blocked |= self.occluded_part::<_, _, N, WIDTH>((simd, simd), packet, active, first);
-            }
-            blocked
-        })
+        let parts = (0..N).step_by(WIDTH);
+        parts.map(|first| self.occluded_narrow(&lanes_of(packet, first, active)) << first).sum()
     }
 
     fn memory_bytes(&self) -> usize {

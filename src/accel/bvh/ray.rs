@@ -34,28 +34,38 @@ impl SingleRay {
         if !(finite && largest > 0.0 && t_near <= ray.t_far) {
             return None;
         }
-        let reciprocal = direction.map(|d| safe_reciprocal(d, largest));
+        let scales = [0, 1, 2].map(|axis| safe_reciprocal(origin[axis], direction[axis], largest));
         let (axes, shear) = shear(direction);
         Some(Self {
             origin,
-            reciprocal,
-            scaled_origin: std::array::from_fn(|axis| origin[axis] * reciprocal[axis]),
+            reciprocal: scales.map(|(reciprocal, _)| reciprocal),
+            scaled_origin: scales.map(|(_, scaled)| scaled),
             signs: direction.map(|d| usize::from(d.is_sign_negative())),
             axes,
             shear,
             t_near,
-            t_far: ray.t_far,
+            // Keeps a t that overflowed from counting as a hit.
+            t_far: ray.t_far.min(f32::MAX),
         })
     }
 }
 
-/// 1/d, kept finite: directions below 10⁻¹⁸ of the largest component count as that much. The boxes'
-/// padding is wider than what such a ray moves along the axis.
+/// 1/d and origin/d along one axis, both finite.
+///
+/// Directions below 10⁻¹⁸ of the largest component count as that much, and no reciprocal is so large
+/// that it takes the origin beyond what a float holds. The boxes' padding is wider than what a ray whose
+/// direction is changed by so little moves along the axis.
 #[inline(always)]
-pub fn safe_reciprocal(d: f32, largest: f32) -> f32 {
+pub fn safe_reciprocal(origin: f32, d: f32, largest: f32) -> (f32, f32) {
     let least = largest * 1e-18;
     let d = if d.abs() < least { least.copysign(d) } else { d };
-    (1.0 / d).clamp(-f32::MAX, f32::MAX)
+    let reciprocal = (1.0 / d).clamp(-f32::MAX, f32::MAX);
+    let scaled = origin * reciprocal;
+    if scaled.abs() <= f32::MAX {
+        return (reciprocal, scaled);
+    }
+    let reciprocal = (1e37 / origin.abs()).copysign(d);
+    (reciprocal, origin * reciprocal)
 }
 
 /// Axes and shear of Woop, Benthin, Wald (2013). The axes keep their cyclic order: since hits on both

@@ -22,7 +22,9 @@ impl BvhAccel {
                 match seen.get_mut(number as usize) {
                     Some(seen) if !*seen => *seen = true,
                     _ => {
-                        return Err(format!("placed instance {number} is referenced twice or does not exist"));
+                        return Err(format!(
+                            "placed instance {number} is referenced twice or does not exist"
+                        ));
                     }
                 }
             }

@@ -72,9 +72,9 @@ const LEAVES: [(&str, f32); 3] = [("leaf_dark", 0.5), ("leaf_light", 0.35), ("le
 /// Triangles that make a full tree; more make more trees.
 const TRIANGLES_PER_TREE: u32 = 1_150;
 /// Distance between neighbouring trees' places.
-const CELL: f32 = 4.6;
+const CELL: f32 = 3.7;
 /// Ground beyond the outermost trees' places.
-const MARGIN: f32 = 9.0;
+const MARGIN: f32 = 7.0;
 /// Half the width of an average crown, and half its height.
 const CROWN: Vec2 = Vec2::new(1.9, 1.55);
 /// Height of an average crown's centre.
@@ -207,8 +207,7 @@ impl Plan {
         let Forest { triangles, lights, seed } = self.forest;
         // With linear falloff the light that reaches a point grows with the forest's extent; this keeps
         // the picture's brightness.
-        let total = 1.5 * (half.x + half.y);
-        let (x, z) = (half.x - CELL / 4.0, half.y - CELL / 4.0);
+        let total = 1.6 * (half.x + half.y);
         let front = half.y;
         format!(
             "\
@@ -219,9 +218,9 @@ background = [0.32, 0.45, 0.62]
 falloff = \"linear\"
 
 [camera]
-position = [{eye_x:.2}, 6.6, {eye_z:.2}]
-look_at = [0.0, 2.1, {look_z:.2}]
-vertical_fov = 46.0
+position = [{eye_x:.2}, 7.6, {eye_z:.2}]
+look_at = [0.0, 1.4, {look_z:.2}]
+vertical_fov = 48.0
 
 [render]
 resolution = [600, 600]
@@ -231,25 +230,28 @@ file = \"forest.obj\"
 
 [[light_box]]
 min = [{min_x:.2}, {low:.2}, {min_z:.2}]
-max = [{x:.2}, {high:.2}, {z:.2}]
+max = [{max_x:.2}, {high:.2}, {max_z:.2}]
 count = {lights}
 seed = {seed}
 total_intensity = {total:.2}
 ",
             eye_x = 2.0,
-            eye_z = front + 11.5,
-            look_z = front - 6.5,
-            min_x = -x,
-            min_z = -z,
+            eye_z = front + 8.5,
+            look_z = front - 4.5,
+            // Beyond the front row, so that the sides that the viewer sees are lit.
+            min_x = -half.x,
+            min_z = -half.y,
+            max_x = half.x,
+            max_z = half.y + CELL,
             low = TOP + 0.2,
             high = TOP + 1.2,
         )
     }
 }
 
-/// Gentle waves, at most 0.21 high and low.
+/// Gentle waves, at most 0.2 high and low.
 fn ground_height(at: Vec2) -> f32 {
-    0.18 * (0.31 * at.x + 0.7).sin() * (0.27 * at.y).cos() + 0.03 * (0.9 * at.y + 0.6 * at.x).sin()
+    0.2 * (0.31 * at.x + 0.7).sin() * (0.27 * at.y).cos()
 }
 
 /// Uniform in the unit ball.

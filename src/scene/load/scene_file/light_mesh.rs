@@ -1,31 +1,36 @@
-//! `[light_mesh]`.
+//! `[light_mesh]` and `[light_mesh.indirect]`.
+
+use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
-use super::values::{LengthsOrAuto, Positive};
+use super::points::{self, PointKeys};
+use super::values::{Count, NonNegative};
 use crate::scene::load::LoadError;
-use crate::settings::{Estimator, LightMeshSettings, Neighbourhood, Radius, Spacing};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, LightMeshSettings, Normalization, Resolve};
 
-/// `[light_mesh]`
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LightMeshTable {
-    spacing: Option<LengthsOrAuto>,
-    radius: Option<Spanned<Positive>>,
-    radius_in_spacings: Option<Positive>,
-    neighbourhood: Option<NeighbourhoodName>,
-    hemisphere: Option<bool>,
-    estimator: Option<EstimatorName>,
+points::point_table! {
+    /// `[light_mesh]`
+    #[derive(Default)]
+    pub struct LightMeshTable {
+        estimator: Option<EstimatorName>,
+        resolve: Option<ResolveName>,
+        indirect: Option<IndirectTable>,
+    }
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum NeighbourhoodName {
-    Nearest,
-    Sphere,
-    SmoothSphere,
+points::point_table! {
+    /// `[light_mesh.indirect]`
+    #[derive(Default)]
+    pub struct IndirectTable {
+        directions: Option<Count<1_000_000>>,
+        bounces: Option<Count<1_000>>,
+        tolerance: Option<NonNegative>,
+        form: Option<FormName>,
+        normalization: Option<NormalizationName>,
+    }
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -37,37 +42,86 @@ enum EstimatorName {
     Directional,
 }
 
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ResolveName {
+    Average,
+    Trace,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum FormName {
+    Scalar,
+    Directional,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum NormalizationName {
+    Mean,
+    Integral,
+}
+
 impl LightMeshTable {
-    /// Puts what is given in place of the defaults.
-    pub fn apply(&self, settings: &mut LightMeshSettings, places: &Places) -> Result<(), LoadError> {
-        match self.spacing {
-            None => {}
-            Some(LengthsOrAuto::Auto) => settings.points.spacing = Spacing::Auto,
-            Some(LengthsOrAuto::Lengths(lengths)) => settings.points.spacing = Spacing::Units(lengths),
-        }
-        match (&self.radius, self.radius_in_spacings) {
-            (None, None) => {}
-            (Some(radius), None) => settings.points.radius = Radius::Units(radius.get_ref().0),
-            (None, Some(radius)) => settings.points.radius = Radius::Spacings(radius.0),
-            (Some(radius), Some(_)) => {
-                let problem = "radius and radius_in_spacings exclude each other";
-                return Err(places.error(&radius.span(), "light_mesh.radius", problem));
-            }
-        }
-        if let Some(name) = self.neighbourhood {
-            settings.points.neighbourhood = match name {
-                NeighbourhoodName::Nearest => Neighbourhood::Nearest,
-                NeighbourhoodName::Sphere => Neighbourhood::Sphere,
-                NeighbourhoodName::SmoothSphere => Neighbourhood::SmoothSphere,
-            };
-        }
-        settings.points.hemisphere = self.hemisphere.unwrap_or(settings.points.hemisphere);
+    /// Puts what is given in place of the defaults; files lie in `folder`.
+    pub fn apply(
+        &self,
+        settings: &mut LightMeshSettings,
+        folder: &Path,
+        places: &Places,
+    ) -> Result<(), LoadError> {
+        self.point_keys("light_mesh").apply(&mut settings.points, folder, places)?;
         if let Some(name) = self.estimator {
             settings.estimator = match name {
                 EstimatorName::Paper => Estimator::Paper,
                 EstimatorName::Ratio => Estimator::Ratio,
                 EstimatorName::PerLight => Estimator::PerLight,
                 EstimatorName::Directional => Estimator::Directional,
+            };
+        }
+        if let Some(name) = self.resolve {
+            settings.resolve = match name {
+                ResolveName::Average => Resolve::Average,
+                ResolveName::Trace => Resolve::Trace,
+            };
+        }
+        // The indirect mesh's points are the direct one's unless its table says otherwise.
+        if let Some(indirect) = &mut settings.indirect {
+            indirect.points = settings.points.clone();
+        }
+        if let Some(table) = &self.indirect {
+            let indirect = settings.indirect.get_or_insert_with(|| IndirectSettings {
+                points: settings.points.clone(),
+                ..Default::default()
+            });
+            table.apply(indirect, folder, places)?;
+        }
+        Ok(())
+    }
+}
+
+impl IndirectTable {
+    fn apply(
+        &self,
+        settings: &mut IndirectSettings,
+        folder: &Path,
+        places: &Places,
+    ) -> Result<(), LoadError> {
+        self.point_keys("light_mesh.indirect").apply(&mut settings.points, folder, places)?;
+        settings.directions = self.directions.map_or(settings.directions, |count| count.0);
+        settings.bounces = self.bounces.map_or(settings.bounces, |count| count.0);
+        settings.tolerance = self.tolerance.map_or(settings.tolerance, |share| share.0);
+        if let Some(name) = self.form {
+            settings.form = match name {
+                FormName::Scalar => IndirectForm::Scalar,
+                FormName::Directional => IndirectForm::Directional,
+            };
+        }
+        if let Some(name) = self.normalization {
+            settings.normalization = match name {
+                NormalizationName::Mean => Normalization::Mean,
+                NormalizationName::Integral => Normalization::Integral,
             };
         }
         Ok(())

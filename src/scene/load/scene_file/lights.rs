@@ -47,25 +47,30 @@ pub struct LightGridTable {
 }
 
 /// `falloff`
-#[derive(Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FalloffName {
-    #[default]
     Linear,
     InverseSquare,
     None,
 }
 
-impl FalloffName {
-    /// φ1, with `falloff_constant` if that is given; `None` where the two do not go together.
-    pub fn with_constant(self, constant: Option<NonNegative>) -> Option<Falloff> {
-        match (self, constant) {
-            (Self::Linear, None) => Some(Falloff::default()),
-            (Self::Linear, Some(constant)) => Some(Falloff::Linear { constant: constant.0 }),
-            (Self::InverseSquare, None) => Some(Falloff::InverseSquare),
-            (Self::None, None) => Some(Falloff::None),
-            (_, Some(_)) => None,
-        }
+/// φ1: `default` unless `falloff` or its constant are given; `None` where the two do not go together.
+pub fn falloff(
+    default: Falloff,
+    name: Option<FalloffName>,
+    constant: Option<NonNegative>,
+) -> Option<Falloff> {
+    let falloff = match name {
+        None => default,
+        Some(FalloffName::Linear) => Falloff::default(),
+        Some(FalloffName::InverseSquare) => Falloff::InverseSquare,
+        Some(FalloffName::None) => Falloff::None,
+    };
+    match (falloff, constant) {
+        (falloff, None) => Some(falloff),
+        (Falloff::Linear { .. }, Some(constant)) => Some(Falloff::Linear { constant: constant.0 }),
+        _ => None,
     }
 }
 

@@ -8,8 +8,8 @@ mod geometry;
 mod light_mesh;
 mod lights;
 mod place;
+mod points;
 mod render;
-mod transform;
 mod values;
 
 use std::fs;
@@ -23,10 +23,10 @@ use self::geometry::{GeometryTable, MaterialTable};
 use self::light_mesh::LightMeshTable;
 use self::lights::{FalloffName, LightBoxTable, LightGridTable, LightTable};
 use self::place::Places;
-use self::render::RenderTable;
+use self::render::{PresetName, RenderTable};
 use self::values::{Color, NonNegative};
 use super::{LoadError, Skipped, Warning};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Falloff, Scene};
 use crate::settings::Settings;
 
 /// A scene, and how its file wants it rendered.
@@ -48,13 +48,14 @@ pub struct LoadedScene {
 #[serde(deny_unknown_fields)]
 struct SceneTable {
     background: Option<Color>,
-    #[serde(default)]
-    falloff: FalloffName,
+    preset: Option<PresetName>,
+    falloff: Option<FalloffName>,
     falloff_constant: Option<Spanned<NonNegative>>,
     camera: Spanned<CameraTable>,
     #[serde(default)]
     render: RenderTable,
-    light_mesh: Option<LightMeshTable>,
+    #[serde(default)]
+    light_mesh: LightMeshTable,
     geometry: Vec<Spanned<GeometryTable>>,
     #[serde(default)]
     material: Vec<Spanned<MaterialTable>>,
@@ -98,16 +99,19 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
     let places = Places::new(path, text);
     let table: SceneTable = toml::from_str(text).map_err(|error| places.parse_error(&error))?;
 
+    let folder = path.parent().unwrap_or(Path::new(""));
     let mut settings = Settings::default();
-    table.render.apply(&mut settings, &places)?;
-    if let Some(light_mesh) = &table.light_mesh {
-        light_mesh.apply(&mut settings.light_mesh, &places)?;
+    let mut falloff = Falloff::default();
+    if let Some(preset) = table.preset {
+        preset.apply(&mut settings, &mut falloff);
     }
+    table.render.apply(&mut settings, &places)?;
+    table.light_mesh.apply(&mut settings.light_mesh, folder, &places)?;
 
     let mut gathered = Gathered::default();
     gathered.cameras.push(CameraTable::camera(&table.camera, &places)?);
     let constant = table.falloff_constant.as_ref().map(|constant| *constant.get_ref());
-    gathered.scene.falloff = table.falloff.with_constant(constant).ok_or_else(|| {
+    gathered.scene.falloff = lights::falloff(falloff, table.falloff, constant).ok_or_else(|| {
         let span = table.falloff_constant.as_ref().map(Spanned::span).unwrap_or_default();
         places.error(&span, "falloff_constant", "needs falloff = \"linear\"")
     })?;
@@ -120,7 +124,6 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
         gathered.scene.lights.extend(LightGridTable::lights(grid, index, &places)?);
     }
 
-    let folder = path.parent().unwrap_or(Path::new(""));
     geometry::load(&table.geometry, &table.material, folder, &places, &mut gathered)?;
     gathered.ensure_material();
     let Gathered { scene, cameras, skipped, warnings } = gathered;

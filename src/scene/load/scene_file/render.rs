@@ -1,12 +1,13 @@
-//! `[render]`.
+//! `[render]`, and `preset`.
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
 use super::values::{Count, Fraction, Stops};
+use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{Integrator, Settings};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Settings};
 
 /// Pixels that a picture may have.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -28,6 +29,32 @@ pub struct RenderTable {
 enum IntegratorName {
     LightMesh,
     Conventional,
+}
+
+/// `preset`
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresetName {
+    Physical,
+}
+
+impl PresetName {
+    /// Changes the defaults; keys that are given still count.
+    pub fn apply(self, settings: &mut Settings, falloff: &mut Falloff) {
+        match self {
+            // Spec §12.
+            Self::Physical => {
+                *falloff = Falloff::InverseSquare;
+                settings.lambertian = true;
+                settings.light_mesh.estimator = Estimator::PerLight;
+                settings.light_mesh.indirect = Some(IndirectSettings {
+                    form: IndirectForm::Directional,
+                    bounces: 16,
+                    ..IndirectSettings::default()
+                });
+            }
+        }
+    }
 }
 
 impl RenderTable {

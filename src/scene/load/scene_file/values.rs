@@ -142,6 +142,10 @@ vector!(
 vector!(
     /// One number for all axes or one per axis, none of them 0.
     ScaleFactors, one_or_three, |v| v.abs().min_element() > 0.0, "not be 0");
+vector!(
+    /// One number for all axes or one per axis, each > 0.
+    Lengths, one_or_three, |v| v.min_element() > 0.0, "be greater than 0");
+
 /// A count in [1, `MAX`].
 #[derive(Clone, Copy, Debug)]
 pub struct Count<const MAX: u32>(pub u32);

@@ -1,0 +1,382 @@
+//! A scene file means what docs/scene-format.md says, and every mistake in it is one error that names file, line
+//! and key.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use glam::Vec3;
+use lightmesh::scene::load::scene_file::load_scene_text;
+use lightmesh::scene::load::{LoadError, LoadedScene, load_scene_file};
+use lightmesh::scene::{Falloff, TriangleMaterials};
+use lightmesh::settings::{
+    Estimator, IndirectForm, Integrator, Leaks, Neighbourhood, Normalization, PointLayout, Radius, Resolve,
+    Spacing,
+};
+use tempfile::TempDir;
+
+const MODEL: &str = "\
+mtllib model.mtl
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+o lamp
+usemtl leaf
+f 1 2 3
+o rest
+f 1 3 4
+";
+
+const CAMERA: &str = "\n[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\n";
+const GEOMETRY: &str = "\n[[geometry]]\nfile = \"model.obj\"\n";
+
+/// A folder with the files that examples refer to.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fs::write(folder.path().join("model.obj"), MODEL).expect("writable");
+    fs::write(folder.path().join("model.mtl"), "newmtl leaf\nKd 0.1 0.2 0.3\n").expect("writable");
+    fs::write(folder.path().join("points.csv"), "x,y,z\n0,0,0\n1, 2, 3\n").expect("writable");
+    folder
+}
+
+fn load_in(folder: &TempDir, text: &str) -> Result<LoadedScene, LoadError> {
+    load_scene_text(text, &folder.path().join("scene.toml"))
+}
+
+/// Loads `text` with a camera and a model added where it has none.
+fn load(text: &str) -> Result<LoadedScene, LoadError> {
+    let mut whole = text.to_owned();
+    if !text.contains("[camera]") {
+        whole.push_str(CAMERA);
+    }
+    if !text.contains("[[geometry]]") {
+        whole.push_str(GEOMETRY);
+    }
+    load_in(&folder(), &whole)
+}
+
+fn loaded(text: &str) -> LoadedScene {
+    load(text).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The error's message without the folder in front of it.
+fn message(text: &str) -> String {
+    let error = load(text).err().unwrap_or_else(|| panic!("loads: {text}")).to_string();
+    let at = error.find("scene.toml").unwrap_or_else(|| panic!("names no file: {error}"));
+    error[at..].to_owned()
+}
+
+fn documentation() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene-format.md");
+    fs::read_to_string(path).expect("the documentation")
+}
+
+#[test]
+fn every_example_of_the_documentation_loads() {
+    let text = documentation();
+    let examples: Vec<&str> =
+        text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(examples.len() >= 12, "found {} examples", examples.len());
+    for example in examples {
+        loaded(example);
+    }
+}
+
+/// Keys of one table, from the parser's own list of what it expects.
+fn accepted_keys(table: &str) -> BTreeSet<String> {
+    let text = format!("{table}\nno_such_key = 1\n");
+    let error = message(&text);
+    let (_, expected) = error.split_once("expected").unwrap_or_else(|| panic!("{error}"));
+    expected.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Keys in the first column of the table under a heading.
+fn documented_keys(documentation: &str, heading: &str) -> BTreeSet<String> {
+    let section =
+        documentation.split(&format!("\n{heading}\n")).nth(1).unwrap_or_else(|| panic!("no {heading}"));
+    let section = section.split("\n#").next().unwrap_or_default();
+    let rows = section.lines().filter_map(|line| line.strip_prefix("| `"));
+    rows.filter_map(|row| row.split('|').next())
+        .flat_map(|cell| cell.split(['`', ',', ' ']))
+        .filter(|key| !key.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn exactly_the_documented_keys_are_accepted() {
+    let text = documentation();
+    for heading in [
+        "## `[render]`",
+        "## `[camera]`",
+        "## `[[material]]`",
+        "## `[[light]]`",
+        "## `[[light_box]]`",
+        "## `[[light_grid]]`",
+        "## `[[geometry]]`",
+        "### `[[light_mesh.region]]`",
+    ] {
+        let header = heading.trim_start_matches('#').trim().trim_matches('`');
+        assert_eq!(accepted_keys(header), documented_keys(&text, heading), "{header}");
+    }
+    let tables = ["indirect", "region"].map(str::to_owned);
+    let mut points = documented_keys(&text, "## `[light_mesh]`");
+    let direct: BTreeSet<String> = accepted_keys("[light_mesh]");
+    points.extend(tables.clone());
+    assert_eq!(direct, points);
+    let mut indirect = documented_keys(&text, "### `[light_mesh.indirect]`");
+    points.retain(|key| !["estimator", "resolve", "indirect"].contains(&key.as_str()));
+    indirect.extend(points);
+    assert_eq!(accepted_keys("[light_mesh.indirect]"), indirect);
+    let mut top = documented_keys(&text, "## Top-level keys");
+    top.extend(
+        ["camera", "render", "geometry", "material", "light", "light_box", "light_grid", "light_mesh"]
+            .map(str::to_owned),
+    );
+    assert_eq!(accepted_keys(""), top);
+}
+
+/// Every mistake is told with its line and the path of its key.
+#[test]
+fn mistakes_name_file_line_and_key() {
+    for (text, expected) in [
+        (
+            "\n[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nvertical_fov = 190",
+            "5: camera.vertical_fov: must lie in (0, 180), found 190",
+        ),
+        ("[camera]\nposition = [0, 2, nan]\nlook_at = [0, 1, 0]", "2: camera.position: must be a finite"),
+        (
+            "[camera]\nposition = [0, 2]\nlook_at = [0, 1, 0]",
+            "2: camera.position: must have three numbers, found 2",
+        ),
+        (
+            "[camera]\nposition = [0, 1, 0]\nlook_at = [0, 1, 0]",
+            "1: camera.look_at: must differ from position",
+        ),
+        ("[camera]\nposition = [0, 5, 0]\nlook_at = [0, 1, 0]", "1: camera.up: must not be parallel"),
+        ("[camera]\nposition = [0, 5, 0]", "1: camera.look_at: is required"),
+        ("background = -1", "1: background: must not be negative"),
+        ("background = 1e39", "1: background: must be a finite"),
+        ("colour = 1", "1: colour: unknown key"),
+        ("falloff = \"cubic\"", "1: falloff: unknown variant"),
+        ("falloff = \"none\"\nfalloff_constant = 2", "2: falloff_constant: needs falloff"),
+        ("[render]\nspp = 0", "2: render.spp: must lie in [1, 65536], found 0"),
+        ("[render]\nspp = \"four\"", "2: render.spp: invalid type"),
+        ("[render]\nresolution = [60000, 60000]", "2: render.resolution: 60000 × 60000 is more than"),
+        ("[render]\nweight_threshold = 2", "2: render.weight_threshold: must lie in [0, 1], found 2"),
+        (
+            "[[light]]\nposition = [0, 0, 0]\nintensity = 1\n[[light]]\nposition = [0, 0, 0]\nintensity = [1, -1, 1]",
+            "6: light[1].intensity: must not be negative",
+        ),
+        ("[[light]]\nposition = [0, 0, 0]", "1: light[0].intensity: is required"),
+        (
+            "[[light_box]]\nmin = [0, 2, 0]\nmax = [1, 1, 1]\ncount = 3\nintensity = 1",
+            "1: light_box[0]: min must not exceed max",
+        ),
+        ("[[light_box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\ncount = 3", "1: light_box[0]: exactly one of"),
+        (
+            "[[light_grid]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\ncounts = [1000, 1000, 1000]\nintensity = 1",
+            "1: light_grid[0]: counts make more than",
+        ),
+        ("[light_mesh]\nspacing = 0", "2: light_mesh.spacing: must be greater than 0"),
+        (
+            "[light_mesh]\nradius = 1\nradius_in_spacings = 2",
+            "2: light_mesh.radius: radius and radius_in_spacings exclude",
+        ),
+        ("[light_mesh]\nlayout_seed = 1", "2: light_mesh.layout_seed: needs layout"),
+        ("[light_mesh]\npoints_file = \"none.csv\"", "2: light_mesh.points_file: cannot read"),
+        ("[light_mesh.indirect]\nbounces = 0", "2: light_mesh.indirect.bounces: must lie in"),
+        (
+            "[[light_mesh.region]]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\nradius = 1",
+            "1: light_mesh.region[0]: min must be less",
+        ),
+        ("[[geometry]]\nfile = \"none.obj\"", "2: geometry[0].file: cannot read"),
+        ("[[geometry]]\nfile = \".\"", "2: geometry[0].file: cannot read"),
+        ("[[geometry]]\nfile = \"model.obj\"\nscale = [1, 0, 1]", "3: geometry[0].scale: must not be 0"),
+        (
+            "[[geometry]]\nfile = \"model.obj\"\nmatrix = [[1, 0, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]]",
+            "3: geometry[0].matrix: flattens space",
+        ),
+        (
+            "[[geometry]]\nfile = \"model.obj\"\nrotate = { axis = [0, 0, 0], degrees = 3 }",
+            "3: geometry[0].rotate.axis: must not be the zero",
+        ),
+        ("[[material]]\nname = \"lead\"", "1: material[0].name: no triangle has a material 'lead'"),
+        ("[[material]]\nobject = \"lead\"", "1: material[0].object: there is no object or group 'lead'"),
+        ("[[material]]\nname = \"leaf\"\ndiffuse = 1.5", "3: material[0].diffuse: must lie in [0, 1]"),
+        ("[render\nspp = 1", "1: "),
+    ] {
+        let found = message(text);
+        assert!(
+            found.starts_with(&format!("scene.toml:{expected}")),
+            "{text}\ngives {found}\nnot   {expected}"
+        );
+        assert!(!found.contains('\n'), "more than one line: {found}");
+    }
+}
+
+#[test]
+fn a_scene_without_camera_or_geometry_says_so() {
+    let folder = folder();
+    for (text, key) in [(CAMERA, "geometry"), (GEOMETRY, "camera")] {
+        let error = load_in(&folder, text).err().expect("incomplete").to_string();
+        assert!(error.ends_with(&format!("{key}: is required")), "{error}");
+    }
+}
+
+#[test]
+fn a_scene_file_that_is_no_text_is_an_error() {
+    let folder = folder();
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, b"\n# \xff\n").expect("writable");
+    assert!(
+        load_scene_file(&path)
+            .err()
+            .expect("not UTF-8")
+            .to_string()
+            .ends_with("scene.toml:2: is not UTF-8 text")
+    );
+    let directory = load_scene_file(folder.path()).err().expect("a directory").to_string();
+    assert!(directory.contains("cannot be read"), "{directory}");
+    assert!(load_scene_file(&folder.path().join("none.toml")).is_err());
+}
+
+#[test]
+fn every_setting_reaches_the_renderer() {
+    let scene = loaded(
+        "\
+background = [1, 2, 3]
+falloff_constant = 0.5
+[render]
+integrator = \"conventional\"
+resolution = [60, 40]
+spp = 4
+max_depth = 3
+weight_threshold = 0.25
+exposure = -1.5
+[light_mesh]
+estimator = \"ratio\"
+resolve = \"trace\"
+layout = \"jittered\"
+layout_seed = 9
+spacing = [1, 2, 3]
+radius = 4
+neighbourhood = \"nearest\"
+hemisphere = false
+leaks = \"allow\"
+[[light_mesh.region]]
+min = [0, 0, 0]
+max = [1, 1, 1]
+spacing = 0.5
+[light_mesh.indirect]
+directions = 64
+bounces = 2
+tolerance = 0.125
+form = \"scalar\"
+normalization = \"integral\"
+spacing = \"auto\"
+radius_in_spacings = 3
+layout = \"body-centred\"
+",
+    );
+    assert_eq!(scene.scene.background, Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(scene.scene.falloff, Falloff::Linear { constant: 0.5 });
+    let settings = scene.settings;
+    assert_eq!(settings.integrator, Integrator::Conventional);
+    assert_eq!((settings.resolution, settings.samples_per_pixel, settings.max_depth), ((60, 40), 4, 3));
+    assert_eq!((settings.weight_threshold, settings.exposure), (0.25, -1.5));
+    let mesh = settings.light_mesh;
+    assert_eq!((mesh.estimator, mesh.resolve), (Estimator::Ratio, Resolve::Trace));
+    assert_eq!(mesh.points.layout, PointLayout::Jittered { seed: 9 });
+    assert_eq!(mesh.points.spacing, Spacing::Units(Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!((mesh.points.radius, mesh.points.neighbourhood), (Radius::Units(4.0), Neighbourhood::Nearest));
+    assert_eq!((mesh.points.hemisphere, mesh.points.leaks), (false, Leaks::Allow));
+    assert_eq!(mesh.points.regions.len(), 1);
+    assert_eq!(mesh.points.regions[0].spacing, Some(Vec3::splat(0.5)));
+    let indirect = mesh.indirect.expect("its table is there");
+    assert_eq!((indirect.directions, indirect.bounces, indirect.tolerance), (64, 2, 0.125));
+    assert_eq!((indirect.form, indirect.normalization), (IndirectForm::Scalar, Normalization::Integral));
+    assert_eq!(indirect.points.layout, PointLayout::BodyCentred);
+    assert_eq!((indirect.points.spacing, indirect.points.radius), (Spacing::Auto, Radius::Spacings(3.0)));
+    assert_eq!((indirect.points.hemisphere, indirect.points.regions.len()), (false, 1), "as the direct mesh");
+}
+
+#[test]
+fn the_physical_preset_changes_defaults_only() {
+    let scene = loaded("preset = \"physical\"\n[light_mesh]\nestimator = \"directional\"");
+    assert_eq!(scene.scene.falloff, Falloff::InverseSquare);
+    assert!(scene.settings.lambertian && scene.settings.light_mesh.indirect.is_some());
+    assert_eq!(scene.settings.light_mesh.estimator, Estimator::Directional);
+    assert_eq!(loaded("preset = \"physical\"\nfalloff = \"none\"").scene.falloff, Falloff::None);
+}
+
+#[test]
+fn points_come_from_a_file() {
+    let scene = loaded("[light_mesh]\npoints_file = \"points.csv\"");
+    let PointLayout::List(points) = scene.settings.light_mesh.points.layout else { panic!("not a list") };
+    assert_eq!(*points, [Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)]);
+}
+
+/// SplitMix64 from seed 0 starts with e220a8397b1dcdaf 6e789e6aa1b965f4 06c45d188009454f (its authors' reference
+/// implementation); the upper 24 bits are the coordinates.
+#[test]
+fn random_lights_follow_the_documented_generator() {
+    let scene = loaded("[[light_box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\ncount = 2\ntotal_intensity = 3");
+    let unit = |bits: u32| bits as f32 / (1 << 24) as f32;
+    let first = scene.scene.lights[0];
+    assert_eq!(first.position, Vec3::new(unit(0xe220a8), unit(0x6e789e), unit(0x06c45d)));
+    assert_eq!((scene.scene.lights.len(), first.intensity), (2, Vec3::splat(1.5)));
+}
+
+#[test]
+fn grid_lights_stand_in_the_cells_centres() {
+    let scene = loaded("[[light_grid]]\nmin = [0, 5, 0]\nmax = [4, 5, 3]\ncounts = [2, 1, 3]\nintensity = 2");
+    let positions: Vec<Vec3> = scene.scene.lights.iter().map(|light| light.position).collect();
+    let expected = [[1.0, 0.5], [3.0, 0.5], [1.0, 1.5], [3.0, 1.5], [1.0, 2.5], [3.0, 2.5]];
+    assert_eq!(positions, expected.map(|[x, z]| Vec3::new(x, 5.0, z)));
+}
+
+#[test]
+fn geometry_is_scaled_then_turned_then_moved() {
+    let scene = loaded(
+        "[[geometry]]\nfile = \"model.obj\"\nscale = [2, 1, 1]\nrotate = [90, 90, 0]\ntranslate = [10, 0, 0]",
+    );
+    // (1, 0, 0) → (2, 0, 0), unmoved by the turn about x, → (0, 0, −2) about y → (10, 0, −2).
+    let mesh = &scene.scene.meshes[0];
+    let [_, corner, _] = mesh.corners(0);
+    assert!(corner.distance(Vec3::new(10.0, 0.0, -2.0)) < 1e-5, "{corner}");
+    assert!(scene.scene.instances[0].to_world.is_none(), "moved, as it stands in one place only");
+}
+
+/// A mirrored model keeps its front outside: the triangle's normal is the mirror image of what it was.
+#[test]
+fn mirroring_keeps_the_front() {
+    let plain = loaded("");
+    let mirrored = loaded("[[geometry]]\nfile = \"model.obj\"\nscale = [1, 1, -1]");
+    let normal = |scene: &LoadedScene| {
+        let [a, b, c] = scene.scene.meshes[0].corners(0);
+        (b - a).cross(c - a)
+    };
+    assert_eq!(normal(&mirrored), normal(&plain) * Vec3::new(1.0, 1.0, -1.0));
+}
+
+#[test]
+fn a_model_in_two_places_is_stored_once() {
+    let scene = loaded(
+        "[[geometry]]\nfile = \"model.obj\"\n[[geometry]]\nfile = \"./model.obj\"\ntranslate = [1, 0, 0]",
+    );
+    assert_eq!((scene.scene.meshes.len(), scene.scene.instances.len()), (1, 2));
+}
+
+#[test]
+fn overrides_of_an_object_leave_others_with_the_same_material_alone() {
+    let scene = loaded("[[material]]\nobject = \"lamp\"\nemission = 4");
+    let mesh = &scene.scene.meshes[0];
+    let material = |triangle| &scene.scene.materials[mesh.materials.of(triangle) as usize];
+    assert_eq!((material(0).emission, material(1).emission), (Vec3::splat(4.0), Vec3::ZERO));
+    assert_eq!(material(0).diffuse, Vec3::new(0.1, 0.2, 0.3), "what is not given stays");
+    let by_name = loaded("[[material]]\nname = \"leaf\"\ntwo_sided = true\ncull = true");
+    assert_eq!(by_name.scene.meshes[0].materials, TriangleMaterials::Uniform(0));
+    assert!(by_name.scene.materials[0].two_sided && by_name.scene.materials[0].cull);
+}
