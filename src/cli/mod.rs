@@ -1,5 +1,6 @@
 //! The program's command line: one file per subcommand.
 
+pub mod bench;
 pub mod compare;
 pub mod gallery;
 mod gallery_page;
@@ -27,6 +28,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Write a procedural scene.
     Generate(generate::GenerateArgs),
+    /// Measure speed.
+    Bench(bench::BenchArgs),
     /// Render the scenes of a list and write a page about them.
     Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
@@ -52,6 +55,10 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args).map_err(anything),
         Command::Generate(args) => generate::run(args).map_err(anything),
+        Command::Bench(args) => match bench::run(args, &mut out) {
+            Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
+            result => result.map_err(anything),
+        },
         Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {
             Ok(compare::Verdict::Passed) => Ok(()),
