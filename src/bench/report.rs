@@ -126,8 +126,9 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.title)?;
         let lines = || std::iter::once(&self.columns).chain(&self.rows);
-        let width =
-            |column: usize| lines().filter_map(|line| line.get(column)).map(|cell| cell.chars().count()).max();
+        let width = |column: usize| {
+            lines().filter_map(|line| line.get(column)).map(|cell| cell.chars().count()).max()
+        };
         for line in lines() {
             for (column, cell) in line.iter().enumerate() {
                 let width = width(column).unwrap_or(0);
