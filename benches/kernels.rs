@@ -13,7 +13,8 @@ use lightmesh::light_mesh::{
 };
 use lightmesh::scene::random::SplitMix64;
 use lightmesh::scene::{
-    Instance, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials, TriangleMesh,
+    Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials,
+    TriangleMesh,
 };
 use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};
 
@@ -46,6 +47,7 @@ fn scene(lights: usize) -> Scene {
     let light = |_| PointLight {
         position: random.in_box(Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.3, 1.0)),
         intensity: Vec3::ONE,
+        shape: LightShape::Point,
     };
     Scene {
         meshes: vec![Arc::new(mesh)],
@@ -104,7 +106,7 @@ fn gather(bencher: Bencher, spacings: f32) {
 #[divan::bench(args = [16, 100, 1000])]
 fn illuminate(bencher: Bencher, lights: usize) {
     let scene = scene(lights);
-    let table = LightTable::new(&scene.lights, scene.falloff);
+    let table = LightTable::of_scene(&scene);
     let surfaces = surfaces();
     bencher.counter(SURFACES).bench_local(|| {
         let light = |surface| table.illuminate(black_box(surface), |_| Some([1.0; LANES]));
@@ -130,7 +132,7 @@ fn irradiance(bencher: Bencher) {
 fn evaluate(bencher: Bencher, basis: Basis) {
     let scene = scene(100);
     let accel = BvhAccel::build(&scene).expect("finite triangles");
-    let table = LightTable::new(&scene.lights, scene.falloff);
+    let table = LightTable::of_scene(&scene);
     let points: Vec<Vec3> = surfaces().iter().map(|surface| surface.position).collect();
     bencher.counter(points.len()).bench_local(|| {
         let mut values = DirectValues::default();

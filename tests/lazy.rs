@@ -106,7 +106,7 @@ fn needed(mesh: &MeshPoints, surfaces: &[SurfacePoint]) -> PointMask {
     let mut neighbours = Neighbours::default();
     for surface in surfaces {
         mesh.neighbours(surface, &mut neighbours);
-        neighbours.iter().for_each(|(id, _)| needed.insert(id));
+        neighbours.ids().iter().for_each(|&id| needed.insert(id));
     }
     PointMask::union(needed.into_bricks())
 }

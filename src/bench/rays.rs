@@ -26,7 +26,7 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
     let setup = forest(triangles, lights)?;
     let backend = Backend::build(options.backend, &setup.scene)?.backend;
     let mut report = new_report("rays", backend.to_string(), options);
-    let table = LightTable::new(&setup.scene.lights, setup.scene.falloff);
+    let table = LightTable::of_scene(&setup.scene);
     let points = mesh_points(&setup.scene, bricks)?;
     let rays = points.len() * table.len();
     log(&format!("{} mesh points, {} lights, {rays} rays", points.len(), table.len()));

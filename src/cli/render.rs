@@ -44,13 +44,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     #[command(flatten)]
-    overrides: Overrides,
+    pub overrides: Overrides,
 }
 
 /// Settings of the scene file that flags can override.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Instead of the scene file's settings")]
-struct Overrides {
+pub struct Overrides {
     /// What computes the light at surfaces
     #[arg(long, value_enum)]
     integrator: Option<IntegratorName>,

@@ -139,9 +139,8 @@ fn see_lights<A: Accel>(accel: &A, lights: &LightTable, points: &[Vec3], bits: &
         let mut visible = [0 as VisibilityBits; LANES];
         for light in lanes_of(chunk.used) {
             for lane in 0..LANES {
-                packet.dir_x[lane] = chunk.position[0][light] - packet.org_x[lane];
-                packet.dir_y[lane] = chunk.position[1][light] - packet.org_y[lane];
-                packet.dir_z[lane] = chunk.position[2][light] - packet.org_z[lane];
+                let x = [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]];
+                [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]] = chunk.way_from(light, x);
             }
             // The query leaves −∞ in blocked lanes.
             packet.tfar = [1.0; LANES];

@@ -78,7 +78,7 @@ impl DirectMesh {
             inside: Vec::new(),
             points: MeshPoints::new(scene.bounds(), &settings.points)?,
             values: DirectValues::default(),
-            lights: LightTable::new(&scene.lights, scene.falloff),
+            lights: LightTable::of_scene(scene),
             estimator: settings.estimator,
         })
     }

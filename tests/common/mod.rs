@@ -12,8 +12,8 @@ use lightmesh::render::{Film, LightMeshes, RenderStats, render, render_light_mes
 use lightmesh::scene::generate::forest::Forest;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
 use lightmesh::scene::{
-    Camera, Falloff, Instance, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials,
-    TriangleMesh,
+    Camera, Falloff, Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint,
+    TriangleMaterials, TriangleMesh,
 };
 use lightmesh::settings::{Integrator, LightMeshSettings, Settings};
 
@@ -84,7 +84,7 @@ pub fn grey(diffuse: f32) -> Material {
 }
 
 pub fn light(position: Vec3, intensity: Vec3) -> PointLight {
-    PointLight { position, intensity }
+    PointLight { position, intensity, shape: LightShape::Point }
 }
 
 pub fn camera(position: Vec3, look_at: Vec3, vertical_fov: f32) -> Camera {
@@ -144,7 +144,7 @@ pub fn direct_illumination(
     let mut neighbours = Neighbours::default();
     for surface in surfaces {
         mesh.points.neighbours(surface, &mut neighbours);
-        neighbours.iter().for_each(|(id, _)| needed.insert(id));
+        neighbours.ids().iter().for_each(|&id| needed.insert(id));
     }
     let needed = PointMask::union(needed.into_bricks());
     let mut scratch = Scratch::default();

@@ -9,10 +9,10 @@ use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3A};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::Gathered;
 use super::place::Places;
 use super::values::{Color, Finite, Point, Reflectance, Rotation, ScaleFactors};
-use super::{Gathered, transform};
-use crate::scene::load::{LoadError, MaterialOverride, Model, Selector, load_model};
+use crate::scene::load::{LoadError, MaterialOverride, Model, Selector, load_model, transform};
 use crate::scene::{Instance, Material, TriangleMaterials, TriangleMesh};
 
 /// `[[geometry]]`

@@ -77,7 +77,7 @@ pub fn falloff(
 impl LightTable {
     /// The light.
     pub fn light(&self) -> PointLight {
-        PointLight { position: self.position.0, intensity: self.intensity.0 }
+        PointLight::new(self.position.0, self.intensity.0)
     }
 }
 
@@ -121,7 +121,7 @@ impl LightBoxTable {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
-            PointLight { position, intensity: each * tint }
+            PointLight::new(position, each * tint)
         }))
     }
 }
@@ -147,7 +147,7 @@ impl LightGridTable {
         Ok((0..count).map(move |i| {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
-            PointLight { position, intensity: each }
+            PointLight::new(position, each)
         }))
     }
 }

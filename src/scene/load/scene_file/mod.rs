@@ -10,7 +10,6 @@ mod lights;
 mod place;
 mod points;
 mod render;
-mod transform;
 mod values;
 
 use std::fs;
