@@ -1,7 +1,7 @@
 //! Rates of the ray-query backends on the rays of light meshes, in million rays per second and thread.
 //!
-//! All backends answer the same rays in one process, in turn, and the median of the rounds is printed, so
-//! that the ratio means something on a busy machine. Arguments: triangles (default 23500 and 1500000).
+//! All backends answer the same rays in one process, in short turns, and medians of rates and of ratios are
+//! printed, so that the ratio means something on a busy machine. Arguments: triangles (default 23500 and 1500000).
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -14,7 +14,10 @@ use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayHitPacke
 use lightmesh::scene::{Instance, Positions, Scene, TriangleMaterials, TriangleMesh};
 
 const LIGHTS: usize = 96;
-const ROUNDS: usize = 5;
+
+/// Rays that one backend answers before it is the other's turn: a few milliseconds.
+const CHUNK: usize = 96 * 16 * 8;
+const ROUNDS: usize = 39;
 
 struct Random(u64);
 
@@ -97,7 +100,7 @@ fn workloads() -> Vec<Workload> {
         p / grid as f32 * Vec3::new(30.0, 6.0, 30.0) - Vec3::new(15.0, 0.0, 15.0)
     };
     // Bricks of 4 × 2 × 2 neighbouring points, a sample of all.
-    let bricks: Vec<[Vec3; 16]> = (0..600)
+    let bricks: Vec<[Vec3; 16]> = (0..400)
         .map(|_| {
             let mut at = |width: usize| (random.unit() * (grid / width) as f32) as usize * width;
             let (x, y, z) = (at(4), at(2), at(2));
@@ -118,7 +121,7 @@ fn workloads() -> Vec<Workload> {
             Ray::new(eye, aim - eye)
         })
     });
-    let sphere = (0..400_000).map(|i| Ray::new(bricks[i / 700 % 600][0], random.vec())).collect();
+    let sphere = (0..400_000).map(|i| Ray::new(bricks[i / 1200 % 400][0], random.vec())).collect();
     vec![
         Workload {
             name: "points to one light",
@@ -135,46 +138,46 @@ fn workloads() -> Vec<Workload> {
     ]
 }
 
-fn any_single(accel: &impl Accel, work: &Workload) -> u32 {
-    work.rays.iter().map(|ray| u32::from(accel.occluded(ray))).sum()
+fn any_single(accel: &impl Accel, rays: &[Ray]) -> u32 {
+    rays.iter().map(|ray| u32::from(accel.occluded(ray))).sum()
 }
 
-fn any_packet<const N: usize>(accel: &impl Accel, work: &Workload) -> u32 {
+fn any_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: Coherence) -> u32 {
     let mut packet = RayPacket::<N>::empty();
     let mut blocked = 0;
-    for rays in work.rays.chunks_exact(N) {
+    for rays in rays.chunks_exact(N) {
         rays.iter().enumerate().for_each(|(lane, ray)| packet.set_lane(lane, ray));
-        blocked += accel.occluded_packet(((1u64 << N) - 1) as u32, &mut packet, work.coherence).count_ones();
+        blocked += accel.occluded_packet(((1u64 << N) - 1) as u32, &mut packet, coherence).count_ones();
     }
     blocked
 }
 
-fn nearest_single(accel: &impl Accel, work: &Workload) -> u32 {
-    work.rays.iter().map(|ray| u32::from(accel.intersect(ray).is_some())).sum()
+fn nearest_single(accel: &impl Accel, rays: &[Ray]) -> u32 {
+    rays.iter().map(|ray| u32::from(accel.intersect(ray).is_some())).sum()
 }
 
-fn nearest_packet<const N: usize>(accel: &impl Accel, work: &Workload) -> u32 {
+fn nearest_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: Coherence) -> u32 {
     let mut packet = RayHitPacket::<N>::empty();
     let mut hits = 0;
-    for rays in work.rays.chunks_exact(N) {
+    for rays in rays.chunks_exact(N) {
         rays.iter().enumerate().for_each(|(lane, ray)| packet.set_lane(lane, ray));
-        accel.intersect_packet(((1u64 << N) - 1) as u32, &mut packet, work.coherence);
+        accel.intersect_packet(((1u64 << N) - 1) as u32, &mut packet, coherence);
         hits += packet.hit.geom_id.iter().filter(|&&id| id != u32::MAX).count() as u32;
     }
     hits
 }
 
 /// Seconds of one run of a query kind, and how many rays hit.
-fn run(accel: &impl Accel, kind: usize, work: &Workload) -> (f64, u32) {
+fn run(accel: &impl Accel, kind: usize, work: &Workload, rays: &[Ray]) -> (f64, u32) {
     let start = Instant::now();
     let hits = match kind {
-        0 => any_single(accel, work),
-        1 => any_packet::<4>(accel, work),
-        2 => any_packet::<8>(accel, work),
-        3 => any_packet::<16>(accel, work),
-        4 => nearest_single(accel, work),
-        5 => nearest_packet::<8>(accel, work),
-        _ => nearest_packet::<16>(accel, work),
+        0 => any_single(accel, rays),
+        1 => any_packet::<4>(accel, rays, work.coherence),
+        2 => any_packet::<8>(accel, rays, work.coherence),
+        3 => any_packet::<16>(accel, rays, work.coherence),
+        4 => nearest_single(accel, rays),
+        5 => nearest_packet::<8>(accel, rays, work.coherence),
+        _ => nearest_packet::<16>(accel, rays, work.coherence),
     };
     (start.elapsed().as_secs_f64(), black_box(hits))
 }
@@ -183,7 +186,7 @@ const KINDS: [&str; 7] = ["any 1", "any 4", "any 8", "any 16", "nearest 1", "nea
 
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn main() {
@@ -206,24 +209,22 @@ fn main() {
         for work in workloads() {
             println!("{:22} {:>10} {:>10} {:>6} {:>7}", work.name, "bvh", "embree", "ratio", "hits");
             for (kind, name) in KINDS.iter().enumerate() {
-                let (mut bvh_seconds, mut embree_seconds, mut hits) = (vec![], vec![], 0);
-                for _ in 0..ROUNDS {
-                    let (seconds, found) = run(&accel, kind, &work);
-                    bvh_seconds.push(seconds);
-                    hits = found;
+                let (mut bvh_rates, mut embree_rates, mut ratios, mut hits) = (vec![], vec![], vec![], 0);
+                for rays in work.rays.chunks_exact(CHUNK).take(ROUNDS) {
+                    let rate = |seconds: f64| CHUNK as f64 / 1e6 / seconds;
+                    let (seconds, found) = run(&accel, kind, &work, rays);
+                    bvh_rates.push(rate(seconds));
+                    hits += found;
                     #[cfg(feature = "embree")]
                     if let Some(embree) = &embree {
-                        embree_seconds.push(run(embree, kind, &work).0);
+                        let (embree_seconds, _) = run(embree, kind, &work, rays);
+                        embree_rates.push(rate(embree_seconds));
+                        ratios.push(embree_seconds / seconds);
                     }
                 }
-                let rate = |seconds: Vec<f64>| work.rays.len() as f64 / 1e6 / median(seconds);
-                let share = f64::from(hits) / work.rays.len() as f64;
-                let bvh = rate(bvh_seconds);
-                if embree_seconds.is_empty() {
-                    embree_seconds.push(f64::NAN);
-                }
-                let embree = rate(embree_seconds);
-                println!("  {name:20} {bvh:10.2} {embree:10.2} {:6.2} {:6.1}%", bvh / embree, 100.0 * share);
+                let share = 100.0 * f64::from(hits) / (CHUNK * bvh_rates.len()) as f64;
+                let [bvh, embree, ratio] = [bvh_rates, embree_rates, ratios].map(median);
+                println!("  {name:20} {bvh:10.2} {embree:10.2} {ratio:6.2} {share:6.1}%");
             }
         }
     }

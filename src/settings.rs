@@ -18,6 +18,8 @@ pub struct Settings {
     pub samples_per_pixel: u32,
     /// What computes the illumination of a surface point.
     pub integrator: Integrator,
+    /// With [`Integrator::Reference`]: positions in D_y at which the field is evaluated, at least 1.
+    pub reference_samples: u32,
     /// Longest path, counted in surface points: 1 is the camera ray's alone.
     pub max_depth: u32,
     /// A path ends where its weight (the product of the k_s so far) falls below this in all channels.
@@ -40,6 +42,7 @@ impl Default for Settings {
             resolution: (800, 600),
             samples_per_pixel: 1,
             integrator: Integrator::LightMesh,
+            reference_samples: 256,
             max_depth: 5,
             weight_threshold: 1e-3,
             exposure: 0.0,
@@ -57,6 +60,9 @@ pub enum Integrator {
     LightMesh,
     /// One occlusion ray per light at every surface point.
     Conventional,
+    /// What a light mesh of infinite density would give, by dense sampling of D_y around every surface point. Slow;
+    /// pictures of light meshes are measured against it.
+    Reference,
 }
 
 /// Settings of the light meshes.

@@ -1,6 +1,9 @@
 //! The program's command line: one file per subcommand.
 
+pub mod bench;
 pub mod compare;
+pub mod gallery;
+mod gallery_page;
 pub mod generate;
 pub mod info;
 pub mod init;
@@ -31,6 +34,10 @@ enum Command {
     Init(init::InitArgs),
     /// Write a procedural scene.
     Generate(generate::GenerateArgs),
+    /// Measure speed.
+    Bench(bench::BenchArgs),
+    /// Render the scenes of a list and write a page about them.
+    Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArgs),
 }
@@ -60,6 +67,11 @@ pub fn main() -> ExitCode {
         },
         Command::Init(args) => init::run(args).map_err(anything),
         Command::Generate(args) => generate::run(args).map_err(anything),
+        Command::Bench(args) => match bench::run(args, &mut out) {
+            Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
+            result => result.map_err(anything),
+        },
+        Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {
             Ok(compare::Verdict::Passed) => Ok(()),
             Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,

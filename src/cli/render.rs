@@ -18,7 +18,7 @@ use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Set
 use crate::with_accel;
 
 /// What `render` takes. Flags override the scene file.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct RenderArgs {
     /// Scene file (TOML) or model (.glb, .gltf, .obj, .ply; also .gz and .zst)
     pub scene: PathBuf,
@@ -44,16 +44,19 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     #[command(flatten)]
-    overrides: Overrides,
+    pub overrides: Overrides,
 }
 
 /// Settings of the scene file that flags can override.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Instead of the scene file's settings")]
-struct Overrides {
+pub struct Overrides {
     /// What computes the light at surfaces
     #[arg(long, value_enum)]
     integrator: Option<IntegratorName>,
+    /// With the integrator `reference`: positions around each surface point at which the light is evaluated
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    reference_samples: Option<u32>,
     /// How direct light follows from the light mesh
     #[arg(long, value_enum)]
     estimator: Option<EstimatorName>,
@@ -95,7 +98,7 @@ macro_rules! names {
     };
 }
 
-names!(IntegratorName for Integrator { LightMesh, Conventional });
+names!(IntegratorName for Integrator { LightMesh, Conventional, Reference });
 names!(EstimatorName for Estimator { Paper, Ratio, PerLight, Directional });
 names!(NeighbourhoodName for Neighbourhood { Nearest, Sphere, SmoothSphere });
 names!(ResolveName for Resolve { Average, Trace });
@@ -147,6 +150,7 @@ impl Overrides {
     fn apply(&self, settings: &mut Settings) {
         let mesh = &mut settings.light_mesh;
         set(&mut settings.integrator, self.integrator);
+        set(&mut settings.reference_samples, self.reference_samples);
         set(&mut mesh.estimator, self.estimator);
         set(&mut mesh.resolve, self.resolve);
         set(&mut mesh.points.neighbourhood, self.neighbourhood);

@@ -1,7 +1,7 @@
 //! Light meshes: lazily evaluated values at mesh points in free space, interpolated at surfaces.
 
 mod direct;
-mod directional;
+pub mod directional;
 mod estimator;
 mod indirect;
 mod lattice;
@@ -18,6 +18,7 @@ pub use direct::{Basis, DirectValues};
 pub use estimator::{DirectMesh, Scratch};
 pub use indirect::{IndirectMesh, IndirectRays};
 pub use lattice::Lattice;
+pub use leaks::is_inside;
 pub use lights::{LANES, LightTable, VisibilityBits, expand_bits};
 pub use neighbours::{Ball, Neighbours};
 pub use points::{MeshError, MeshPoints, PointCounters};

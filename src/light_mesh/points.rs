@@ -167,6 +167,13 @@ impl MeshPoints {
         })
     }
 
+    /// Region of space whose points make up D_y of a surface point, unless the neighbourhood is the nearest point.
+    pub fn ball(&self, surface: &SurfacePoint) -> Ball {
+        let normal = self.hemisphere.then_some(surface.geometric_normal);
+        let smooth = self.neighbourhood == Neighbourhood::SmoothSphere;
+        Ball::new(surface.position, normal, self.layer_at(surface.position).radius, smooth)
+    }
+
     /// Position of a point.
     pub fn position(&self, id: u64) -> Vec3 {
         let index = self.layers.partition_point(|layer| layer.first_id <= id).saturating_sub(1);

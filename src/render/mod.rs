@@ -5,6 +5,7 @@ mod camera_rays;
 mod conventional;
 mod light_mesh;
 mod paths;
+mod reference;
 mod stats;
 mod tiles;
 mod wavefront;
@@ -14,6 +15,7 @@ pub use stats::{MeshCounters, RayCounters, RenderStats, StageSeconds};
 
 use self::conventional::ConventionalIntegrator;
 use self::light_mesh::LightMeshIntegrator;
+use self::reference::ReferenceIntegrator;
 use self::wavefront::{direct_scale, wavefront};
 use crate::accel::Backend;
 use crate::light_mesh::{DirectMesh, IndirectMesh, LightTable, MeshError};
@@ -99,6 +101,23 @@ pub fn render_conventional(
     })
 }
 
+/// Renders what light meshes of infinite density would give (spec §10); direct light only.
+///
+/// # Errors
+/// As for light meshes of the same settings.
+pub fn render_reference(
+    backend: &Backend,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Film, RenderStats), MeshError> {
+    with_accel!(backend, accel => {
+        let mut integrator = ReferenceIntegrator::new(accel, scene, settings)?;
+        Ok(wavefront(accel, scene, camera, settings, &mut integrator, progress))
+    })
+}
+
 /// Renders with the integrator that the settings name.
 pub fn render(
     backend: &Backend,
@@ -109,6 +128,7 @@ pub fn render(
 ) -> Result<(Film, RenderStats), MeshError> {
     match settings.integrator {
         Integrator::Conventional => Ok(render_conventional(backend, scene, camera, settings, progress)),
+        Integrator::Reference => render_reference(backend, scene, camera, settings, progress),
         Integrator::LightMesh => {
             let mut meshes = LightMeshes::new(scene, settings)?;
             Ok(render_light_mesh(backend, scene, camera, settings, &mut meshes, progress))

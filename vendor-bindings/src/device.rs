@@ -193,3 +193,53 @@ unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post: bool) -> 
     state.memory.fetch_add(bytes, Ordering::Relaxed);
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors carry Embree's own text, go to the thread that made them, and are gone once fetched. The
+    /// safe layer lets no mistake through that could be made here, so the raw functions make one: a
+    /// buffer that is not aligned.
+    #[test]
+    fn errors_carry_embrees_text() {
+        let Ok(library) = Library::load() else {
+            if std::env::var_os("REQUIRE_EMBREE").is_some() {
+                panic!("Embree is required");
+            }
+            let _ = std::io::Write::write_all(&mut std::io::stderr(), b"SKIPPED errors_carry_embrees_text\n");
+            return;
+        };
+        let device = Device::new(&library, "").unwrap();
+        let data = [0u32; 16];
+        // SAFETY: Embree refuses the pointer and does not keep it; the geometry is released once.
+        let geometry = unsafe {
+            let geometry =
+                call!(device.api(), rtcNewGeometry(device.handle(), v4::RTC_GEOMETRY_TYPE_TRIANGLE));
+            call!(
+                device.api(),
+                rtcSetSharedGeometryBuffer(
+                    geometry,
+                    v4::RTC_BUFFER_TYPE_INDEX,
+                    0,
+                    v4::RTC_FORMAT_UINT3,
+                    data.as_ptr().cast(),
+                    1,
+                    12,
+                    1
+                )
+            );
+            geometry
+        };
+        let elsewhere = device.clone();
+        assert_eq!(thread::spawn(move || elsewhere.check("do nothing")).join().unwrap(), Ok(()));
+        let error = device.check("share a buffer").unwrap_err();
+        // SAFETY: the handle is valid.
+        unsafe { call!(device.api(), rtcReleaseGeometry(geometry)) };
+        let Error::Embree { action, code, text } = &error else { panic!("{error:?}") };
+        assert_eq!((*action, *code), ("share a buffer", Code::InvalidOperation));
+        assert!(text.contains("align"), "{text}");
+        assert!(error.to_string().contains(text), "{error}");
+        assert_eq!(device.check("do nothing"), Ok(()));
+    }
+}

@@ -181,6 +181,9 @@ impl Geometry {
 ///
 /// Debian's builds abort on rays beyond, so this is not left to Embree.
 fn largest_coordinate(to_world: &[[f32; 3]; 4]) -> Option<f32> {
+    if !to_world.iter().flatten().all(|entry| entry.is_finite()) {
+        return None;
+    }
     let [x, y, z, origin] = to_world.map(|column| column.map(f64::from));
     let cross = |a: [f64; 3], b: [f64; 3]| {
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -269,7 +269,9 @@ impl Scene {
         unsafe {
             match self.api() {
                 Api::V3(embree) => {
-                    let mut context = context3(coherent);
+                    // Debian's 3.13.5 never returns from some coherent 16-wide occlusion queries: its
+                    // AVX-512 code stores 16 bits of a lane mask and reads back 64.
+                    let mut context = context3(coherent && N < 16);
                     match N {
                         4 => (embree.rtcOccluded4)(valid, scene, &mut context, rays.cast()),
                         8 => (embree.rtcOccluded8)(valid, scene, &mut context, rays.cast()),

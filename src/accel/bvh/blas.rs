@@ -2,7 +2,7 @@
 
 use crate::scene::CutOut;
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, map3};
 use super::node::{TriangleBlock, WIDTH, WideTree};
 use super::ray::SingleRay;
 use super::traverse::{any_hit, nearest_hit};
@@ -120,20 +120,24 @@ impl Blas {
 
     #[inline(always)]
     fn test_block<S: Lanes<WIDTH>>(simd: S, block: &TriangleBlock, ray: &SingleRay) -> EdgeTest<S::F> {
-        let corners = block.corners.each_ref().map(
+        let corners = map3(
+            [&block.corners[0], &block.corners[1], &block.corners[2]],
             #[inline(always)]
             |corner| {
-                ray.axes.map(
+                map3(
+                    ray.axes,
                     #[inline(always)]
                     |axis| simd.load(&corner[axis]),
                 )
             },
         );
-        let origin = ray.axes.map(
+        let origin = map3(
+            ray.axes,
             #[inline(always)]
             |axis| simd.splat(ray.origin[axis]),
         );
-        let shear = ray.shear.map(
+        let shear = map3(
+            ray.shear,
             #[inline(always)]
             |s| simd.splat(s),
         );

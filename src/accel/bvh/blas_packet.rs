@@ -3,7 +3,7 @@
 use crate::accel::LaneMask;
 
 use super::blas::{Blas, Nearest};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, map3};
 use super::node::{TriangleBlock, WIDTH};
 use super::packet::{Group, PacketRays};
 use super::traverse::{any_hit, nearest_hit};
@@ -211,20 +211,24 @@ fn test_triangle<K: Lanes<W>, const W: usize>(
     triangle: usize,
     lanes: LaneMask,
 ) -> Option<(EdgeTest<K::F>, Distances<W>)> {
-    let corners = block.corners.each_ref().map(
+    let corners = map3(
+        [&block.corners[0], &block.corners[1], &block.corners[2]],
         #[inline(always)]
         |corner| {
-            group.axes.map(
+            map3(
+                group.axes,
                 #[inline(always)]
                 |axis| simd.splat(corner[axis][triangle]),
             )
         },
     );
-    let origin = group.axes.map(
+    let origin = map3(
+        group.axes,
         #[inline(always)]
         |axis| simd.load(&rays.origin[axis]),
     );
-    let shear = group.shear.each_ref().map(
+    let shear = map3(
+        [&group.shear[0], &group.shear[1], &group.shear[2]],
         #[inline(always)]
         |s| simd.load(s),
     );

@@ -4,6 +4,8 @@ use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
 use crate::accel::Ray;
 
+use super::lanes::map3;
+
 /// The map of rays from world to object space, row by row; t is the same on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldToObject([[f32; 4]; 3]);
@@ -26,13 +28,13 @@ impl WorldToObject {
     /// and packets agree.
     #[inline(always)]
     pub fn point(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        self.0.map(|row| row[0] * x + row[1] * y + row[2] * z + row[3])
+        map3(self.0, |row| row[0] * x + row[1] * y + row[2] * z + row[3])
     }
 
     /// A direction in object space, its length scaled along.
     #[inline(always)]
     pub fn direction(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        self.0.map(|row| row[0] * x + row[1] * y + row[2] * z)
+        map3(self.0, |row| row[0] * x + row[1] * y + row[2] * z)
     }
 
     /// A ray in object space.

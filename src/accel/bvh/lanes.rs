@@ -4,17 +4,30 @@
 //! the last bit; only [`Lanes::mul_sub`] may be fused, and it is used for box tests alone, which are
 //! padded against rounding.
 
+use pulp::NullaryFnOnce;
 #[cfg(target_arch = "x86_64")]
 use pulp::{
     f32x8, f32x16,
     x86::{V3, V4},
 };
 
+/// `array::map` for three elements that is always inlined: what isn't inlined into the traversal functions
+/// is compiled without their instruction set.
+#[inline(always)]
+pub fn map3<T, U>([a, b, c]: [T; 3], f: impl Fn(T) -> U) -> [U; 3] {
+    [f(a), f(b), f(c)]
+}
+
 /// Vectors of `W` floats on one instruction set level.
 pub trait Lanes<const W: usize>: Copy {
     /// `W` floats in registers.
     type F: Copy;
 
+    /// Runs a task compiled for this level; whatever it calls must be inlined into it.
+    ///
+    /// Tasks are types of their own, since the call of a closure may come out as a function that isn't
+    /// compiled for the level.
+    fn vectorize<T: NullaryFnOnce>(self, task: T) -> T::Output;
     fn splat(self, value: f32) -> Self::F;
     fn load(self, values: &[f32; W]) -> Self::F;
     fn store(self, values: Self::F) -> [f32; W];
@@ -71,6 +84,11 @@ impl<const W: usize> Lanes<W> for Portable {
     type F = [f32; W];
 
     #[inline(always)]
+    fn vectorize<T: NullaryFnOnce>(self, task: T) -> T::Output {
+        task.call()
+    }
+
+    #[inline(always)]
     fn splat(self, value: f32) -> [f32; W] {
         [value; W]
     }
@@ -114,6 +132,11 @@ macro_rules! x86_lanes {
         #[doc = $suffix]
         impl Lanes<$width> for $token {
             type F = $vector;
+
+            #[inline(always)]
+            fn vectorize<T: NullaryFnOnce>(self, task: T) -> T::Output {
+                <$token>::vectorize(self, task)
+            }
 
             #[inline(always)]
             fn splat(self, value: f32) -> $vector {

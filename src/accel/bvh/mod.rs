@@ -15,6 +15,7 @@ mod packet;
 mod query;
 mod ray;
 mod scene_tree;
+mod top_level;
 mod traverse;
 mod traverse_packet;
 mod triangle;
@@ -105,8 +106,8 @@ impl BvhAccel {
         let (fixed, instances) = build_scene(scene)?;
         let needed = instances.trees.iter().chain([&fixed]).map(|blas| blas.tree.stack_bound).max();
         let needed = needed.unwrap_or(0).max(instances.tree.stack_bound);
-        if needed > query::STACK {
-            return Err(BvhError::TooDeep { needed, limit: query::STACK });
+        if needed > top_level::STACK {
+            return Err(BvhError::TooDeep { needed, limit: top_level::STACK });
         }
         Ok(Self { fixed, instances, dispatch, level })
     }

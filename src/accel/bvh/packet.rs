@@ -2,7 +2,7 @@
 
 use crate::accel::LaneMask;
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, map3};
 use super::node::{FAR_SCALE, Node, WIDTH};
 use super::ray::{SingleRay, largest_axis, safe_reciprocal};
 
@@ -56,8 +56,8 @@ impl<const W: usize> PacketRays<W> {
             kinds: [0; W],
         };
         for lane in 0..W {
-            let o = origin.map(|axis| axis[lane]);
-            let d = direction.map(|axis| axis[lane]);
+            let o = lane_of(&origin, lane);
+            let d = lane_of(&direction, lane);
             let largest = d[0].abs().max(d[1].abs()).max(d[2].abs());
             let near = t_near[lane].max(0.0) + 0.0;
             // x · 0 is 0 for finite x only.
@@ -71,7 +71,7 @@ impl<const W: usize> PacketRays<W> {
                 rays.reciprocal[axis][lane] = reciprocal;
                 rays.scaled_origin[axis][lane] = scaled;
             }
-            let signs = d.map(|d| d.to_bits() >> 31);
+            let signs = map3(d, |d| d.to_bits() >> 31);
             rays.kinds[lane] =
                 (signs[0] | signs[1] << 1 | signs[2] << 2 | (largest_axis(d) as u32) << 3) as u8;
         }
@@ -96,7 +96,7 @@ impl<const W: usize> PacketRays<W> {
             shear[1][lane] = self.direction[ky][lane] / dz;
             shear[2][lane] = 1.0 / dz;
         }
-        let signs = [kind & 1, kind >> 1 & 1, kind >> 2 & 1].map(usize::from);
+        let signs = [usize::from(kind & 1), usize::from(kind >> 1 & 1), usize::from(kind >> 2 & 1)];
         Group { lanes: mask & lanes, signs, axes: [kx, ky, kz], shear }
     }
 
@@ -148,7 +148,7 @@ impl<const W: usize> PacketRays<W> {
 }
 
 #[inline(always)]
-fn lane_of<const W: usize>(values: &[[f32; W]; 3], lane: usize) -> [f32; 3] {
+pub fn lane_of<const W: usize>(values: &[[f32; W]; 3], lane: usize) -> [f32; 3] {
     [values[0][lane], values[1][lane], values[2][lane]]
 }
 

@@ -1,27 +1,24 @@
-//! The queries: dispatch to an instruction set once per call, then both levels of trees.
+//! The queries, dispatched to an instruction set once per ray or packet.
+
+use pulp::NullaryFnOnce;
+#[cfg(target_arch = "x86_64")]
+use pulp::x86::{V3, V4};
 
 use crate::accel::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
 
-use super::blas::Nearest;
 use super::lanes::{Lanes, Portable};
 use super::node::WIDTH;
 use super::packet::{PacketRays, RawRays};
-use super::ray::SingleRay;
-use super::traverse::{any_hit, nearest_hit};
-use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
 use super::{BvhAccel, SimdLevel};
-
-/// Entries of a traversal stack.
-pub const STACK: usize = 160;
 
 /// Proof that the processor has what the chosen level needs.
 #[derive(Clone, Copy)]
 pub enum Dispatch {
     Portable,
     #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
+    Avx2(V3),
     #[cfg(target_arch = "x86_64")]
-    Avx512(pulp::x86::V4),
+    Avx512(V4),
 }
 
 impl Dispatch {
@@ -30,263 +27,124 @@ impl Dispatch {
         match level {
             SimdLevel::Portable => Some(Self::Portable),
             #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
+            SimdLevel::Avx2 => V3::try_new().map(Self::Avx2),
             #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
+            SimdLevel::Avx512 => V4::try_new().map(Self::Avx512),
             #[cfg(not(target_arch = "x86_64"))]
             SimdLevel::Avx2 | SimdLevel::Avx512 => None,
         }
     }
 }
 
-/// Runs an expression with `$simd` bound to the chosen level, compiled for that level.
-macro_rules! dispatch {
-    ($dispatch:expr, |$simd:ident| $body:expr) => {
-        match $dispatch {
-            Dispatch::Portable => {
-                let $simd = Portable;
-                $body
-            }
+impl Dispatch {
+    /// Runs a task on the level, compiled for it.
+    #[inline(always)]
+    fn run<T: Task>(self, task: T) -> T::Output {
+        match self {
+            Self::Portable => task.run(Portable),
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2($simd) => $simd.vectorize(
-                #[inline(always)]
-                || $body,
-            ),
+            Self::Avx2(simd) => simd.vectorize(OnLevel { simd, task }),
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx512($simd) => $simd.vectorize(
-                #[inline(always)]
-                || $body,
-            ),
+            Self::Avx512(simd) => simd.vectorize(OnLevel { simd, task }),
         }
-    };
-}
-
-impl BvhAccel {
-    #[inline(always)]
-    fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
-        let single = SingleRay::new(ray)?;
-        let nearest = self.fixed.intersect::<S, STACK>(simd, &single);
-        let mut best = None;
-        self.offer_fixed(&nearest, &mut best);
-        if self.instances.placed.is_empty() {
-            return best;
-        }
-        let t_far = best.map_or(ray.t_far, |hit| hit.t);
-        nearest_hit(
-            &self.instances.tree,
-            simd,
-            &single,
-            0,
-            &mut [0; STACK],
-            t_far,
-            #[inline(always)]
-            |leaf| {
-                for &number in &self.instances.leaves[leaf] {
-                    self.intersect_placed(simd, number, ray, &mut best);
-                }
-                best.map_or(ray.t_far, |hit| hit.t)
-            },
-        );
-        best
-    }
-
-    #[inline(always)]
-    fn intersect_placed<S: Lanes<WIDTH>>(&self, simd: S, number: u32, ray: &Ray, best: &mut Option<Hit>) {
-        let Some(placed) = self.instances.placed.get(number as usize) else { return };
-        let t_far = best.map_or(ray.t_far, |hit| hit.t);
-        let Some(ray) = SingleRay::new(&Ray { t_far, ..placed.to_object.ray(ray) }) else { return };
-        let nearest = self.instances.trees[placed.tree].intersect::<S, STACK>(simd, &ray);
-        offer_placed(&nearest, placed.instance, best);
-    }
-
-    fn offer_fixed(&self, nearest: &Nearest, best: &mut Option<Hit>) {
-        if nearest.id != u32::MAX {
-            let (instance, triangle) = self.fixed.resolve(nearest.id);
-            offer(best, nearest, instance, triangle);
-        }
-    }
-
-    #[inline(always)]
-    fn occluded_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> bool {
-        let Some(single) = SingleRay::new(ray) else { return false };
-        if self.fixed.occluded::<S, STACK>(simd, &single) {
-            return true;
-        }
-        if self.instances.placed.is_empty() {
-            return false;
-        }
-        any_hit(
-            &self.instances.tree,
-            simd,
-            &single,
-            0,
-            &mut [0; STACK],
-            #[inline(always)]
-            |leaf| {
-                self.instances.leaves[leaf].iter().any(|&number| {
-                    let Some(placed) = self.instances.placed.get(number as usize) else { return false };
-                    let Some(ray) = SingleRay::new(&placed.to_object.ray(ray)) else { return false };
-                    self.instances.trees[placed.tree].occluded::<S, STACK>(simd, &ray)
-                })
-            },
-        )
-    }
-
-    #[inline(always)]
-    fn occluded_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
-        &self,
-        simd: (K, S),
-        rays: &PacketRays<W>,
-    ) -> LaneMask {
-        let mut blocked = self.fixed.occluded_packet::<K, S, W, STACK>(simd, rays, rays.active);
-        if self.instances.placed.is_empty() {
-            return blocked;
-        }
-        let mut remaining = rays.active & !blocked;
-        while remaining != 0 {
-            let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
-            remaining &= !group.lanes;
-            let visit_leaf = |leaf: usize, lanes: LaneMask| {
-                let mut found = 0;
-                for &number in &self.instances.leaves[leaf] {
-                    let Some(placed) = self.instances.placed.get(number as usize) else { break };
-                    let local = transformed(rays, placed, lanes & !found);
-                    found |= self.instances.trees[placed.tree].occluded_packet::<K, S, W, STACK>(
-                        simd,
-                        &local,
-                        local.active,
-                    );
-                }
-                found
-            };
-            let mut stack = [0; STACK];
-            blocked |= any_hit_packet::<K, S, W, STACK>(
-                &self.instances.tree,
-                simd,
-                rays,
-                &group,
-                #[inline(always)]
-                |visit| match visit {
-                    Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes),
-                    Visit::Alone(start, lane) => {
-                        let ray = rays.single(&group, lane);
-                        let hit = any_hit(&self.instances.tree, simd.1, &ray, start, &mut stack, |leaf| {
-                            visit_leaf(leaf, 1 << lane) != 0
-                        });
-                        u32::from(hit) << lane
-                    }
-                },
-            );
-        }
-        blocked
-    }
-
-    #[inline(always)]
-    fn intersect_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
-        &self,
-        simd: (K, S),
-        rays: &mut PacketRays<W>,
-    ) -> [Option<Hit>; W] {
-        let mut found = [None; W];
-        let mut nearest = rays.t_far.map(Nearest::none);
-        self.fixed.intersect_packet::<K, S, W, STACK>(simd, rays, rays.active, &mut nearest);
-        for (nearest, best) in nearest.iter().zip(&mut found) {
-            self.offer_fixed(nearest, best);
-        }
-        if self.instances.placed.is_empty() {
-            return found;
-        }
-        let mut remaining = rays.active;
-        let mut stack = [0; STACK];
-        while remaining != 0 {
-            let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
-            remaining &= !group.lanes;
-            let hits = &mut found;
-            let mut visit_leaf = |leaf: usize, lanes: LaneMask, rays: &mut PacketRays<W>| {
-                for &number in &self.instances.leaves[leaf] {
-                    let Some(placed) = self.instances.placed.get(number as usize) else { break };
-                    let mut local = transformed(rays, placed, lanes);
-                    let mut nearest = local.t_far.map(Nearest::none);
-                    let active = local.active;
-                    self.instances.trees[placed.tree].intersect_packet::<K, S, W, STACK>(
-                        simd,
-                        &mut local,
-                        active,
-                        &mut nearest,
-                    );
-                    for (lane, nearest) in nearest.iter().enumerate() {
-                        offer_placed(nearest, placed.instance, &mut hits[lane]);
-                        if let Some(hit) = hits[lane] {
-                            rays.t_far[lane] = hit.t;
-                        }
-                    }
-                }
-            };
-            nearest_hit_packet::<K, S, W, STACK>(
-                &self.instances.tree,
-                simd,
-                rays,
-                &group,
-                #[inline(always)]
-                |visit, rays| match visit {
-                    Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes, rays),
-                    Visit::Alone(start, lane) => {
-                        let ray = rays.single(&group, lane);
-                        let t_far = ray.t_far;
-                        nearest_hit(&self.instances.tree, simd.1, &ray, start, &mut stack, t_far, |leaf| {
-                            visit_leaf(leaf, 1 << lane, rays);
-                            rays.t_far[lane % W]
-                        });
-                    }
-                },
-            );
-        }
-        found
     }
 }
 
-/// The rays `lanes` in the object space of an instance.
-#[inline(always)]
-fn transformed<const W: usize>(
-    rays: &PacketRays<W>,
-    placed: &super::scene_tree::Placed,
-    lanes: LaneMask,
-) -> PacketRays<W> {
-    let (mut origin, mut direction) = ([[0.0; W]; 3], [[0.0; W]; 3]);
-    for lane in 0..W {
-        let point = placed.to_object.point(rays.origin.map(|axis| axis[lane]));
-        let along = placed.to_object.direction(rays.direction.map(|axis| axis[lane]));
-        for axis in 0..3 {
-            origin[axis][lane] = point[axis];
-            direction[axis][lane] = along[axis];
-        }
-    }
-    PacketRays::new(&RawRays { origin, direction, t_near: rays.t_near, t_far: rays.t_far, active: lanes })
+/// A query that can be compiled for any level.
+trait Task {
+    type Output;
+    fn run<S: Lanes<WIDTH>>(self, simd: S) -> Self::Output;
 }
 
-fn offer_placed(nearest: &Nearest, instance: u32, best: &mut Option<Hit>) {
-    if nearest.id != u32::MAX {
-        offer(best, nearest, instance, nearest.id);
+/// A task bound to a level.
+struct OnLevel<S, T> {
+    simd: S,
+    task: T,
+}
+
+impl<S: Lanes<WIDTH>, T: Task> NullaryFnOnce for OnLevel<S, T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.task.run(self.simd)
     }
 }
 
-/// Takes a hit that is nearer, or as near with a lower instance and triangle.
-fn offer(best: &mut Option<Hit>, nearest: &Nearest, instance: u32, triangle: u32) {
-    let t = nearest.hit.t;
-    let better = best.is_none_or(|best| {
-        t < best.t || (t == best.t && (instance, triangle) < (best.instance, best.triangle))
-    });
-    if better {
-        *best = Some(Hit { t, u: nearest.hit.u, v: nearest.hit.v, instance, triangle });
+struct SingleAny<'a>(&'a BvhAccel, &'a Ray);
+
+impl Task for SingleAny<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Lanes<WIDTH>>(self, simd: S) -> bool {
+        self.0.occluded_with(simd, self.1)
+    }
+}
+
+struct SingleNearest<'a>(&'a BvhAccel, &'a Ray);
+
+impl Task for SingleNearest<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<S: Lanes<WIDTH>>(self, simd: S) -> Option<Hit> {
+        self.0.intersect_with(simd, self.1)
+    }
+}
+
+struct PacketAny<'a, const W: usize>(&'a BvhAccel, &'a RawRays<W>);
+
+impl Task for PacketAny<'_, WIDTH> {
+    type Output = LaneMask;
+
+    #[inline(always)]
+    fn run<S: Lanes<WIDTH>>(self, simd: S) -> LaneMask {
+        self.0.occluded_lanes((simd, simd), &PacketRays::new(self.1))
+    }
+}
+
+struct PacketNearest<'a, const W: usize>(&'a BvhAccel, &'a RawRays<W>);
+
+impl Task for PacketNearest<'_, WIDTH> {
+    type Output = [Option<Hit>; WIDTH];
+
+    #[inline(always)]
+    fn run<S: Lanes<WIDTH>>(self, simd: S) -> [Option<Hit>; WIDTH] {
+        self.0.intersect_lanes((simd, simd), &mut PacketRays::new(self.1))
+    }
+}
+
+/// A packet of sixteen, which only AVX-512 takes as one.
+#[cfg(target_arch = "x86_64")]
+impl NullaryFnOnce for OnLevel<V4, PacketAny<'_, 16>> {
+    type Output = LaneMask;
+
+    #[inline(always)]
+    fn call(self) -> LaneMask {
+        let PacketAny(accel, raw) = self.task;
+        accel.occluded_lanes((self.simd, self.simd), &PacketRays::new(raw))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl NullaryFnOnce for OnLevel<V4, PacketNearest<'_, 16>> {
+    type Output = [Option<Hit>; 16];
+
+    #[inline(always)]
+    fn call(self) -> [Option<Hit>; 16] {
+        let PacketNearest(accel, raw) = self.task;
+        accel.intersect_lanes((self.simd, self.simd), &mut PacketRays::new(raw))
     }
 }
 
 #[inline(always)]
 fn take<const N: usize, const W: usize>(first: usize, values: &[f32; N]) -> [f32; W] {
-    std::array::from_fn(
-        #[inline(always)]
-        |lane| if first + lane < N { values[first + lane] } else { 0.0 },
-    )
+    let mut lanes = [0.0; W];
+    for (lane, &value) in lanes.iter_mut().zip(&values[first..]) {
+        *lane = value;
+    }
+    lanes
 }
 
 /// Lanes `first..first + W` of a packet; lanes beyond its end are inactive.
@@ -309,27 +167,21 @@ fn lanes_of<const N: usize, const W: usize>(
 // Not generic over the packet's size, so that they are compiled once, in this crate.
 impl BvhAccel {
     fn occluded_narrow(&self, raw: &RawRays<WIDTH>) -> LaneMask {
-        dispatch!(self.dispatch, |simd| self.occluded_lanes((simd, simd), &PacketRays::new(raw)))
+        self.dispatch.run(PacketAny(self, raw))
     }
 
     fn intersect_narrow(&self, raw: &RawRays<WIDTH>) -> [Option<Hit>; WIDTH] {
-        dispatch!(self.dispatch, |simd| self.intersect_lanes((simd, simd), &mut PacketRays::new(raw)))
+        self.dispatch.run(PacketNearest(self, raw))
     }
 
     #[cfg(target_arch = "x86_64")]
-    fn occluded_wide(&self, simd: pulp::x86::V4, raw: &RawRays<16>) -> LaneMask {
-        simd.vectorize(
-            #[inline(always)]
-            || self.occluded_lanes((simd, simd), &PacketRays::new(raw)),
-        )
+    fn occluded_wide(&self, simd: V4, raw: &RawRays<16>) -> LaneMask {
+        simd.vectorize(OnLevel { simd, task: PacketAny(self, raw) })
     }
 
     #[cfg(target_arch = "x86_64")]
-    fn intersect_wide(&self, simd: pulp::x86::V4, raw: &RawRays<16>) -> [Option<Hit>; 16] {
-        simd.vectorize(
-            #[inline(always)]
-            || self.intersect_lanes((simd, simd), &mut PacketRays::new(raw)),
-        )
+    fn intersect_wide(&self, simd: V4, raw: &RawRays<16>) -> [Option<Hit>; 16] {
+        simd.vectorize(OnLevel { simd, task: PacketNearest(self, raw) })
     }
 
     fn write_hits<const N: usize>(&self, hits: &[Option<Hit>], first: usize, packet: &mut RayHitPacket<N>) {
@@ -350,11 +202,11 @@ impl BvhAccel {
 
 impl Accel for BvhAccel {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        dispatch!(self.dispatch, |simd| self.intersect_with(simd, ray))
+        self.dispatch.run(SingleNearest(self, ray))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        dispatch!(self.dispatch, |simd| self.occluded_with(simd, ray))
+        self.dispatch.run(SingleAny(self, ray))
     }
 
     fn intersect_packet<const N: usize>(&self, active: LaneMask, packet: &mut RayHitPacket<N>, _: Coherence) {

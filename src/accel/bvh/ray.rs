@@ -2,6 +2,8 @@
 
 use crate::accel::Ray;
 
+use super::lanes::map3;
+
 /// A ray that is fit for traversal.
 #[derive(Clone, Copy, Debug)]
 pub struct SingleRay {
@@ -34,13 +36,13 @@ impl SingleRay {
         if !(finite && largest > 0.0 && t_near <= ray.t_far) {
             return None;
         }
-        let scales = [0, 1, 2].map(|axis| safe_reciprocal(origin[axis], direction[axis], largest));
+        let scales = map3([0, 1, 2], |axis| safe_reciprocal(origin[axis], direction[axis], largest));
         let (axes, shear) = shear(direction);
         Some(Self {
             origin,
-            reciprocal: scales.map(|(reciprocal, _)| reciprocal),
-            scaled_origin: scales.map(|(_, scaled)| scaled),
-            signs: direction.map(|d| usize::from(d.is_sign_negative())),
+            reciprocal: map3(scales, |(reciprocal, _)| reciprocal),
+            scaled_origin: map3(scales, |(_, scaled)| scaled),
+            signs: map3(direction, |d| usize::from(d.is_sign_negative())),
             axes,
             shear,
             t_near,
@@ -82,7 +84,7 @@ pub fn shear(direction: [f32; 3]) -> ([usize; 3], [f32; 3]) {
 /// The axis with the largest component, the first of equals.
 #[inline(always)]
 pub fn largest_axis(direction: [f32; 3]) -> usize {
-    let [x, y, z] = direction.map(f32::abs);
+    let [x, y, z] = map3(direction, f32::abs);
     if x >= y && x >= z {
         0
     } else if y >= z {

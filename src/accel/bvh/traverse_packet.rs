@@ -177,5 +177,9 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
 /// The least value; NaN doesn't count.
 #[inline(always)]
 fn least<const W: usize>(values: [f32; W]) -> f32 {
-    values.into_iter().fold(f32::INFINITY, |least, value| if value < least { value } else { least })
+    let mut least = f32::INFINITY;
+    for value in values {
+        least = if value < least { value } else { least };
+    }
+    least
 }

@@ -6,7 +6,7 @@
 //! between. Where one comes out as 0, or overflows, the lane is computed again in double precision, in
 //! which products of two floats are exact.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, map3};
 
 /// Edge functions of a set of ray-triangle pairs.
 pub struct EdgeTest<F> {
@@ -66,7 +66,8 @@ pub fn test_edges<S: Lanes<W>, const W: usize>(
 ) -> EdgeTest<S::F> {
     let [ox, oy, oz] = origin;
     let [shear_x, shear_y, _] = shear;
-    let sheared = corners.map(
+    let sheared = map3(
+        corners,
         #[inline(always)]
         |[x, y, z]| {
             let z = simd.sub(z, oz);
@@ -99,7 +100,8 @@ impl<F: Copy> EdgeTest<F> {
         t_far: F,
     ) -> Distances<W> {
         let [u, v, w] = self.edges;
-        let [a, b, c] = self.sheared.map(
+        let [a, b, c] = map3(
+            self.sheared,
             #[inline(always)]
             |p| simd.mul(shear_z, p[2]),
         );
@@ -115,7 +117,8 @@ impl<F: Copy> EdgeTest<F> {
         let inside = simd.le(t_near, t) & simd.le(t, t_far);
         Distances {
             t: simd.store(t),
-            edges: self.edges.map(
+            edges: map3(
+                self.edges,
                 #[inline(always)]
                 |e| simd.store(e),
             ),
@@ -135,10 +138,12 @@ impl<F: Copy> EdgeTest<F> {
         t_near: f32,
         t_far: f32,
     ) -> Option<LaneHit> {
-        let corners = self.sheared.map(
+        let corners = map3(
+            self.sheared,
             #[inline(always)]
             |p| {
-                p.map(
+                map3(
+                    p,
                     #[inline(always)]
                     |f| simd.store(f)[lane],
                 )

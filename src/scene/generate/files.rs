@@ -16,6 +16,12 @@ pub type Content<'a> = &'a dyn Fn(&mut dyn Write) -> io::Result<()>;
 /// [`GenerateError::Write`]
 pub fn write_files(folder: &Path, files: &[(&str, Content)]) -> Result<(), GenerateError> {
     fs::create_dir_all(folder).map_err(|source| GenerateError::Write { path: folder.to_owned(), source })?;
+    for (name, _) in files {
+        let path = folder.join(name);
+        if path.is_dir() {
+            return Err(GenerateError::Write { path, source: io::ErrorKind::IsADirectory.into() });
+        }
+    }
     let mut partial = Vec::new();
     for (name, content) in files {
         let file = Partial { path: folder.join(format!(".{name}.{}.partial", std::process::id())) };

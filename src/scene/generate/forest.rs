@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use super::{GenerateError, write_files};
 use crate::scene::random::SplitMix64;
@@ -168,7 +168,7 @@ impl Plan {
         let spine: Vec<(Vec3, f32)> = (0..=TRUNK.1)
             .map(|ring| {
                 let t = ring as f32 / TRUNK.1 as f32;
-                let radius = size * (0.07 + 0.17 * (1.0 - t) + 0.1 * (1.0 - t).powi(4));
+                let radius = size * (0.07 + 0.17 * (1.0 - t) + 0.1 * (1.0 - t) * (1.0 - t) * (1.0 - t));
                 (root.lerp(centre, t * t * 0.25 + t * 0.75), radius)
             })
             .collect();
@@ -177,7 +177,8 @@ impl Plan {
             let fork = root.lerp(centre, 0.72);
             for branch in 0..BRANCHES.0 {
                 let angle = TAU * (branch as f32 + random.between(-0.3, 0.3)) / BRANCHES.0 as f32;
-                let outward = Vec3::new(angle.cos(), random.between(-0.1, 0.5), angle.sin());
+                let (sin, cos) = sin_cos(angle);
+                let outward = Vec3::new(cos, random.between(-0.1, 0.5), sin);
                 let tip = centre + outward * half * random.between(0.55, 0.75);
                 tube(text, &[(fork, 0.07 * size), (tip, 0.015 * size)], BRANCHES.1);
             }
@@ -249,9 +250,16 @@ total_intensity = {total:.2}
     }
 }
 
+/// Computed in double precision, so that the result in single precision is the same with every system's
+/// library, and a seed the same forest everywhere.
+fn sin_cos(angle: f32) -> (f32, f32) {
+    let (sin, cos) = f64::from(angle).sin_cos();
+    (sin as f32, cos as f32)
+}
+
 /// Gentle waves, at most 0.2 high and low.
 fn ground_height(at: Vec2) -> f32 {
-    0.2 * (0.31 * at.x + 0.7).sin() * (0.27 * at.y).cos()
+    0.2 * sin_cos(0.31 * at.x + 0.7).0 * sin_cos(0.27 * at.y).1
 }
 
 /// Uniform in the unit ball.
@@ -271,7 +279,8 @@ fn tube(text: &mut String, spine: &[(Vec3, f32)], sides: u32) {
     for (centre, radius) in spine {
         for side in 0..sides {
             let angle = TAU * side as f32 / sides as f32;
-            vertex(text, *centre + (u * angle.cos() + v * angle.sin()) * *radius);
+            let (sin, cos) = sin_cos(angle);
+            vertex(text, *centre + (u * cos + v * sin) * *radius);
         }
     }
     let rings = spine.len() as i64;
@@ -293,7 +302,8 @@ fn leaf(text: &mut String, at: Vec3, outward: Vec3, size: f32, whole: bool, rand
     let heading = outward + in_ball(random) * 0.8 + Vec3::NEG_Y * 0.15;
     let along = heading.try_normalize().unwrap_or(Vec3::X);
     let flat = Vec3::Y.cross(along).try_normalize().unwrap_or(Vec3::Z);
-    let across = Quat::from_axis_angle(along, random.between(-0.9, 0.9)) * flat;
+    let (sin, cos) = sin_cos(random.between(-0.9, 0.9));
+    let across = flat * cos + along.cross(flat) * sin;
     let fold = across.cross(along) * (0.25 * width);
     let middle = at + along * (0.45 * length);
     vertex(text, at);

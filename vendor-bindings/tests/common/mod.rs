@@ -8,15 +8,24 @@ use embree_sys::{Device, Geometry, Library, Opacity, Ray, Scene, SceneBuilder};
 
 pub type Buffers = (Arc<Vec<[f32; 3]>>, Arc<Vec<[u32; 3]>>);
 
-/// The installed library. Without one the test is skipped, aloud; where `REQUIRE_EMBREE` is set it fails.
+/// The installed library. Without one the test is skipped, aloud; where `REQUIRE_EMBREE` is set it fails,
+/// as it does where that names another major version than the one found.
 pub fn library() -> Option<Library> {
+    let required = std::env::var("REQUIRE_EMBREE").ok();
     match Library::load() {
-        Ok(library) => Some(library),
-        Err(error) if std::env::var_os("REQUIRE_EMBREE").is_some() => panic!("{error}"),
+        Ok(library) => {
+            if let Some(major) =
+                required.and_then(|value| value.parse::<u32>().ok()).filter(|major| *major > 1)
+            {
+                assert_eq!(library.version().major, major, "REQUIRE_EMBREE names the version");
+            }
+            Some(library)
+        }
+        Err(error) if required.is_some() => panic!("{error}"),
         Err(error) => {
-            let thread = std::thread::current();
+            let test = std::thread::current();
             // Not eprintln!, which the test harness swallows.
-            let _ = writeln!(std::io::stderr(), "SKIPPED {}: {error}", thread.name().unwrap_or_default());
+            let _ = writeln!(std::io::stderr(), "SKIPPED {}: {error}", test.name().unwrap_or_default());
             None
         }
     }

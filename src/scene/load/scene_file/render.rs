@@ -17,6 +17,7 @@ const MAX_PIXELS: u64 = 1 << 28;
 #[serde(deny_unknown_fields)]
 pub struct RenderTable {
     integrator: Option<IntegratorName>,
+    reference_samples: Option<Count<65_536>>,
     resolution: Option<Spanned<[Count<65_536>; 2]>>,
     spp: Option<Count<65_536>>,
     max_depth: Option<Count<1_000>>,
@@ -30,6 +31,7 @@ pub struct RenderTable {
 enum IntegratorName {
     LightMesh,
     Conventional,
+    Reference,
 }
 
 /// `preset`
@@ -73,8 +75,11 @@ impl RenderTable {
             settings.integrator = match integrator {
                 IntegratorName::LightMesh => Integrator::LightMesh,
                 IntegratorName::Conventional => Integrator::Conventional,
+                IntegratorName::Reference => Integrator::Reference,
             };
         }
+        settings.reference_samples =
+            self.reference_samples.map_or(settings.reference_samples, |count| count.0);
         settings.samples_per_pixel = self.spp.map_or(settings.samples_per_pixel, |count| count.0);
         settings.max_depth = self.max_depth.map_or(settings.max_depth, |count| count.0);
         settings.weight_threshold =
