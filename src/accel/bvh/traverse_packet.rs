@@ -8,10 +8,7 @@ use crate::accel::LaneMask;
 
 use super::lanes::Lanes;
 use super::node::{FAR_SCALE, LEAF, WIDTH, WideTree};
-use super::packet::{Group, PacketRays};
-
-/// From this many rays on a node's children are tested one by one against the whole group.
-const GROUP_TEST: u32 = 5;
+use super::packet::{GROUP_TEST, Group, PacketRays, least};
 
 /// What a walk with several rays leaves to its caller.
 pub enum Visit {
@@ -52,7 +49,7 @@ pub fn any_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK:
         } else {
             let node = &tree.nodes[current as usize];
             if lanes.count_ones() >= GROUP_TEST {
-                let mut used = node.used;
+                let mut used = rays.may_meet(narrow, group, node);
                 while used != 0 {
                     let slot = used.trailing_zeros() as usize % WIDTH;
                     used &= used - 1;
@@ -130,7 +127,7 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
         // Where the first of the rays enters each child: orders and later culls.
         let mut nearest = [0.0f32; WIDTH];
         if lanes.count_ones() >= GROUP_TEST {
-            let mut used = node.used;
+            let mut used = rays.may_meet(narrow, group, node);
             while used != 0 {
                 let slot = used.trailing_zeros() as usize % WIDTH;
                 used &= used - 1;
@@ -172,14 +169,4 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
             size += 1;
         }
     }
-}
-
-/// The least value; NaN doesn't count.
-#[inline(always)]
-fn least<const W: usize>(values: [f32; W]) -> f32 {
-    let mut least = f32::INFINITY;
-    for value in values {
-        least = if value < least { value } else { least };
-    }
-    least
 }
