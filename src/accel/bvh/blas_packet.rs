@@ -22,6 +22,7 @@ impl Blas {
         let mut blocked = 0;
         let mut remaining = active & rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [0; STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -30,6 +31,7 @@ impl Blas {
                 (wide, narrow),
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit| match visit {
                     Visit::Leaf(leaf, lanes) => {
@@ -66,6 +68,7 @@ impl Blas {
         let mut found = NearestLanes { u: [0.0; W], v: [0.0; W], ids: [u32::MAX; W] };
         let mut remaining = active & rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [(0, 0, 0.0); STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -74,6 +77,7 @@ impl Blas {
                 (wide, narrow),
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit, rays| match visit {
                     Visit::Leaf(leaf, lanes) => {

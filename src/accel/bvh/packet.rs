@@ -7,7 +7,7 @@ use super::node::{FAR_SCALE, Node, WIDTH};
 use super::ray::{SingleRay, largest_axis, safe_reciprocal};
 
 /// From this many rays on a node's children are tested one by one against the whole group.
-pub const GROUP_TEST: u32 = 5;
+pub const GROUP_TEST: u32 = 6;
 
 /// `W` rays as a structure of arrays, prepared for traversal.
 #[derive(Clone)]
