@@ -1,6 +1,7 @@
 //! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
 
 pub mod accel;
+pub mod bench;
 pub mod cli;
 pub mod image;
 pub mod light_mesh;

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use crate::scene::generate::GenerateError;
 use crate::scene::generate::forest::Forest;
+use crate::scene::generate::interior::Interior;
+use crate::scene::generate::{GenerateError, still_life};
 
 /// Write a scene made by rule
 #[derive(Args, Clone, Debug)]
@@ -20,6 +21,10 @@ pub struct GenerateArgs {
 pub enum GeneratedScene {
     /// Trees with separate small leaves under point lights: forest.obj, forest.mtl and forest.toml
     Forest(ForestArgs),
+    /// A hall with columns and benches under many lamps: interior.obj, interior.mtl and interior.toml
+    Interior(InteriorArgs),
+    /// Balls, boxes and columns before a wall: still-life.obj and still-life.mtl
+    StillLife(StillLifeArgs),
 }
 
 /// Arguments of `lightmesh generate forest`.
@@ -41,6 +46,30 @@ pub struct ForestArgs {
     pub output: PathBuf,
 }
 
+/// Arguments of `lightmesh generate interior`.
+#[derive(Args, Clone, Debug)]
+pub struct InteriorArgs {
+    /// Number of pairs of columns along the hall
+    #[arg(long, value_name = "N", default_value_t = 6,
+          value_parser = clap::value_parser!(u32).range(i64::from(Interior::BAYS.0)..=i64::from(Interior::BAYS.1)))]
+    pub bays: u32,
+    /// Number of lamps per pair of columns
+    #[arg(long, value_name = "N", default_value_t = 40,
+          value_parser = clap::value_parser!(u32).range(i64::from(Interior::LAMPS.0)..=i64::from(Interior::LAMPS.1)))]
+    pub lamps: u32,
+    /// Folder to write into, created if need be
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+}
+
+/// Arguments of `lightmesh generate still-life`.
+#[derive(Args, Clone, Debug)]
+pub struct StillLifeArgs {
+    /// Folder to write into, created if need be
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+}
+
 /// Runs the subcommand.
 ///
 /// # Errors
@@ -50,5 +79,9 @@ pub fn run(args: &GenerateArgs) -> Result<(), GenerateError> {
         GeneratedScene::Forest(ForestArgs { triangles, lights, seed, output }) => {
             Forest { triangles: *triangles, lights: *lights, seed: *seed }.write(output)
         }
+        GeneratedScene::Interior(InteriorArgs { bays, lamps, output }) => {
+            Interior { bays: *bays, lamps: *lamps }.write(output)
+        }
+        GeneratedScene::StillLife(StillLifeArgs { output }) => still_life::write(output),
     }
 }

@@ -1,7 +1,12 @@
 //! The program's command line: one file per subcommand.
 
+pub mod bench;
 pub mod compare;
+pub mod gallery;
+mod gallery_page;
 pub mod generate;
+pub mod info;
+pub mod init;
 mod progress;
 pub mod render;
 mod stats_file;
@@ -23,8 +28,16 @@ struct Cli {
 enum Command {
     /// Render a scene file to a picture.
     Render(Box<render::RenderArgs>),
+    /// Tell what a scene file or model holds.
+    Info(info::InfoArgs),
+    /// Write a scene file for a model, with the camera, lights and settings that were chosen.
+    Init(init::InitArgs),
     /// Write a procedural scene.
     Generate(generate::GenerateArgs),
+    /// Measure speed.
+    Bench(bench::BenchArgs),
+    /// Render the scenes of a list and write a page about them.
+    Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArgs),
 }
@@ -47,7 +60,18 @@ pub fn main() -> ExitCode {
     let mut out = io::stdout().lock();
     let result = match &cli.command {
         Command::Render(args) => render::run(args).map_err(anything),
+        Command::Info(args) => match info::run(args, &mut out) {
+            Ok(()) => Ok(()),
+            Err(info::InfoError::Output(error)) => Err(anything(error)),
+            Err(error) => Err(anything(error)),
+        },
+        Command::Init(args) => init::run(args).map_err(anything),
         Command::Generate(args) => generate::run(args).map_err(anything),
+        Command::Bench(args) => match bench::run(args, &mut out) {
+            Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
+            result => result.map_err(anything),
+        },
+        Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {
             Ok(compare::Verdict::Passed) => Ok(()),
             Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,

@@ -49,6 +49,8 @@ impl Basis {
 pub struct DirectValues {
     bits: Vec<VisibilityBits>,
     values: Vec<f32>,
+    /// Light at each point, summed over channels and directions; only beside scalar and directional values.
+    amounts: Vec<f32>,
 }
 
 impl DirectValues {
@@ -65,6 +67,12 @@ impl DirectValues {
         self.values[at..at + N].first_chunk().unwrap_or(&[0.0; N])
     }
 
+    /// Amount of light at the point in `slot`, to compare points with.
+    #[inline(always)]
+    pub fn amount(&self, slot: u32) -> f32 {
+        self.amounts[slot as usize]
+    }
+
     /// Evaluates further mesh points, whose slots follow those that are there; returns the number of occlusion rays.
     pub fn evaluate<A: Accel>(
         &mut self,
@@ -76,6 +84,7 @@ impl DirectValues {
         let chunks = lights.chunks().len();
         if chunks == 0 || points.is_empty() {
             self.values.resize(self.values.len() + points.len() * basis.stride(), 0.0);
+            self.amounts.resize(self.amounts.len() + points.len(), 0.0);
             return 0;
         }
         let first = self.bits.len();
@@ -95,6 +104,14 @@ impl DirectValues {
             Basis::Bits => {}
             Basis::Scalar => derive(lights, points, bits, values, direct_light),
             Basis::Directional => derive(lights, points, bits, values, irradiance_by_normal),
+        }
+        let values = &self.values[first_value..];
+        match basis {
+            Basis::Bits => {}
+            Basis::Scalar => self.amounts.extend(values.chunks_exact(6).map(|v| v[0] + v[1] + v[2])),
+            Basis::Directional => {
+                self.amounts.extend(values.chunks_exact(directional::STRIDE).map(directional::amount));
+            }
         }
         (points.len() * lights.len()) as u64
     }
@@ -122,9 +139,8 @@ fn see_lights<A: Accel>(accel: &A, lights: &LightTable, points: &[Vec3], bits: &
         let mut visible = [0 as VisibilityBits; LANES];
         for light in lanes_of(chunk.used) {
             for lane in 0..LANES {
-                packet.dir_x[lane] = chunk.position[0][light] - packet.org_x[lane];
-                packet.dir_y[lane] = chunk.position[1][light] - packet.org_y[lane];
-                packet.dir_z[lane] = chunk.position[2][light] - packet.org_z[lane];
+                let x = [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]];
+                [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]] = chunk.way_from(light, x);
             }
             // The query leaves −∞ in blocked lanes.
             packet.tfar = [1.0; LANES];

@@ -53,6 +53,13 @@ pub fn irradiance(coefficients: &[f32; STRIDE], n: Vec3) -> Vec3 {
     Vec3::from_array(channels).max(Vec3::ZERO)
 }
 
+/// Light from all directions, summed over the channels: the squares' coefficients of a lobe sum to 3/4 whatever its
+/// direction. Up to that factor it is what scalar values hold.
+#[inline(always)]
+pub fn amount(coefficients: &[f32]) -> f32 {
+    coefficients.chunks_exact(COEFFICIENTS).take(3).map(|c| c[3] + c[4] + c[5]).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

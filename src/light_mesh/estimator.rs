@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::direct::{Basis, DirectValues};
 use super::directional;
-use super::leaks::{is_inside, keep_visible};
+use super::leaks::{amounts_differ, is_inside, keep_visible, lights_differ};
 use super::lights::{LANES, Lanes, LightTable, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
@@ -78,7 +78,7 @@ impl DirectMesh {
             inside: Vec::new(),
             points: MeshPoints::new(scene.bounds(), &settings.points)?,
             values: DirectValues::default(),
-            lights: LightTable::new(&scene.lights, scene.falloff),
+            lights: LightTable::of_scene(scene),
             estimator: settings.estimator,
         })
     }
@@ -92,14 +92,19 @@ impl DirectMesh {
         self.values.evaluate(accel, &self.lights, Basis::of(self.estimator), &new)
     }
 
-    /// Whether some light is seen from one of the points and hidden from another. Where there is none, leaving points
-    /// out changes no visibility.
+    /// Whether the points of D_y differ so much that a wall may stand between them.
     #[inline(always)]
     fn disagree(&self, slots: &[u32]) -> bool {
-        let chunks = self.lights.chunks().len();
-        let Some((&first, rest)) = slots.split_first() else { return false };
-        let first = self.values.bits(first, chunks);
-        rest.iter().any(|&slot| self.values.bits(slot, chunks) != first)
+        match Basis::of(self.estimator) {
+            Basis::Bits => {
+                let chunks = self.lights.chunks().len();
+                lights_differ(slots.iter().map(|&slot| self.values.bits(slot, chunks)))
+            }
+            // Not a look at each light, since the cost of these must not grow with the lights.
+            Basis::Scalar | Basis::Directional => {
+                amounts_differ(slots.iter().map(|&slot| self.values.amount(slot)))
+            }
+        }
     }
 
     /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.

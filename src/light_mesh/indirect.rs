@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::directional::{self, COEFFICIENTS};
 use super::estimator::{DirectMesh, Scratch};
-use super::leaks::is_inside_by_share;
+use super::leaks::{amounts_differ, is_inside_by_share};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::sphere::SphereStrata;
@@ -275,10 +275,7 @@ impl IndirectMesh {
             let value = self.value(slot as u32);
             self.amounts[slot] = match self.settings.form {
                 IndirectForm::Scalar => value.iter().sum(),
-                // The squares' coefficients sum to (15 + 3·3)/32 of the light, times 4, for each channel.
-                IndirectForm::Directional => {
-                    value.chunks(COEFFICIENTS).take(3).map(|c| (c[3] + c[4] + c[5]) / 3.0).sum()
-                }
+                IndirectForm::Directional => directional::amount(value),
             };
         }
     }
@@ -336,15 +333,7 @@ impl IndirectMesh {
     /// Whether the points see so different amounts of light that a wall may stand between them.
     #[inline(always)]
     fn disagree(&self, slots: &[u32]) -> bool {
-        /// Ratio of amounts that neighbouring points in one room rarely exceed.
-        const CONTRAST: f32 = 1.5;
-        let (mut least, mut most) = (f32::INFINITY, 0.0f32);
-        for &slot in slots {
-            let amount = self.amounts[slot as usize];
-            least = least.min(amount);
-            most = most.max(amount);
-        }
-        most > CONTRAST * least
+        amounts_differ(slots.iter().map(|&slot| self.amounts[slot as usize]))
     }
 
     /// Bytes held by slots and values.

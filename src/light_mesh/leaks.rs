@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::lights::LANES;
+use super::lights::{LANES, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::MeshPoints;
 use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
@@ -44,6 +44,38 @@ pub fn is_inside<A: Accel>(accel: &A, scene: &Scene, x: Vec3) -> bool {
 /// Whether `backs` back faces in so many directions say that the point is inside.
 pub fn is_inside_by_share(backs: usize, directions: usize) -> bool {
     backs as f32 > INSIDE_SHARE * directions as f32
+}
+
+/// Ratio of the amounts of light at neighbouring mesh points that calls for a look: points of one room rarely differ as
+/// much, points on both sides of a wall mostly do.
+const CONTRAST: f32 = 2.0;
+
+/// Whether mesh points get so different amounts of light that a wall may stand between them.
+#[inline(always)]
+pub fn amounts_differ(amounts: impl Iterator<Item = f32>) -> bool {
+    let (least, most) =
+        amounts.fold((f32::INFINITY, 0.0f32), |(least, most), amount| (least.min(amount), most.max(amount)));
+    most > CONTRAST * least
+}
+
+/// Whether mesh points see so different lights that a wall may stand between them: of the lights that any of them sees,
+/// less than one in `SHARED` is seen by all. A few leaves in the way don't do that where there are many lights.
+#[inline(always)]
+pub fn lights_differ<'a>(mut points: impl Iterator<Item = &'a [VisibilityBits]> + Clone) -> bool {
+    /// See above.
+    const SHARED: u32 = 4;
+    let Some(first) = points.next() else { return false };
+    let (mut by_all, mut by_any) = (0, 0);
+    for (chunk, &bits) in first.iter().enumerate() {
+        let (mut all, mut any) = (bits, bits);
+        for other in points.clone() {
+            all &= other[chunk];
+            any |= other[chunk];
+        }
+        by_all += all.count_ones();
+        by_any += any.count_ones();
+    }
+    by_all * SHARED < by_any
 }
 
 /// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.

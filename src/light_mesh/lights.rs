@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::{Falloff, PointLight, SurfacePoint};
+use crate::scene::{Falloff, LightShape, PointLight, Scene, SurfacePoint};
 
 /// Lights per chunk: one AVX-512 register, two of AVX2.
 pub const LANES: usize = 16;
@@ -16,18 +16,73 @@ pub type VisibilityBits = u16;
 /// Sixteen lights.
 #[derive(Clone, Debug)]
 pub struct LightChunk {
-    /// lp, by axis.
+    /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
     pub position: [Lanes; 3],
+    /// What lights that are no point lights differ in; `None` where all lanes are point lights.
+    shapes: Option<Box<ShapeLanes>>,
     /// E, by channel; 0 in lanes that hold no light.
     pub intensity: [Lanes; 3],
     /// The lanes that hold a light.
     pub used: VisibilityBits,
 }
 
+/// Spot and directional lights of a chunk; lanes with point lights hold what changes nothing.
+#[derive(Clone, Debug)]
+struct ShapeLanes {
+    /// 0 for directional lights, 1 for the others: what the lit point is multiplied by before the way to the light
+    /// is taken.
+    local: Lanes,
+    /// The cone's axis.
+    axis: [Lanes; 3],
+    /// Terms of [`LightShape::cone_terms`].
+    slope: Lanes,
+    offset: Lanes,
+}
+
+impl ShapeLanes {
+    const POINTS: Self =
+        Self { local: [1.0; LANES], axis: [[0.0; LANES]; 3], slope: [0.0; LANES], offset: [1.0; LANES] };
+
+    fn set(&mut self, lane: usize, shape: LightShape) {
+        (self.slope[lane], self.offset[lane]) = shape.cone_terms();
+        match shape {
+            LightShape::Point => {}
+            LightShape::Spot { direction, .. } => {
+                (0..3).for_each(|axis| self.axis[axis][lane] = direction[axis]);
+            }
+            LightShape::Directional { .. } => self.local[lane] = 0.0,
+        }
+    }
+
+    /// Share of E_i that a light sends towards a point from which the way to the light is `to_light`, `distance` long.
+    #[inline(always)]
+    fn cone(&self, lane: usize, to_light: [f32; 3], distance: f32) -> f32 {
+        let [x, y, z] = to_light;
+        let along = self.axis[0][lane] * x + self.axis[1][lane] * y + self.axis[2][lane] * z;
+        let share = (self.offset[lane] - self.slope[lane] * along / distance).clamp(0.0, 1.0);
+        share * share
+    }
+
+    /// φ1 of directional lights is 1: 1/(t·φ1(t)) is 1/t.
+    #[inline(always)]
+    fn over_distance(&self, lane: usize, attenuation: impl Attenuation, distance: f32) -> f32 {
+        if self.local[lane] == 0.0 { 1.0 / distance } else { attenuation.over_distance(distance) }
+    }
+}
+
+impl LightChunk {
+    /// The way from `x` to the light in `lane`: its end is beyond all that could hide the light.
+    #[inline(always)]
+    pub fn way_from(&self, lane: usize, x: [f32; 3]) -> [f32; 3] {
+        let local = self.shapes.as_ref().map_or(1.0, |shapes| shapes.local[lane]);
+        [0, 1, 2].map(|axis| self.position[axis][lane] - local * x[axis])
+    }
+}
+
 /// All lights of a scene in chunks of 16.
 ///
-/// The order is that of the scene, except that lights are sorted along a Morton curve: lights in one chunk
-/// are neighbours, so that they are mostly seen together or hidden together.
+/// The order is that of the scene, except that point lights come first, and lights are sorted along a Morton curve:
+/// lights in one chunk are neighbours, so that they are mostly seen together or hidden together.
 #[derive(Clone, Debug)]
 pub struct LightTable {
     chunks: Vec<LightChunk>,
@@ -37,19 +92,39 @@ pub struct LightTable {
 
 impl LightTable {
     /// Table of a scene's lights.
-    pub fn new(lights: &[PointLight], falloff: Falloff) -> Self {
+    pub fn of_scene(scene: &Scene) -> Self {
+        let directional = |light: &PointLight| matches!(light.shape, LightShape::Directional { .. });
+        let reach = if scene.lights.iter().any(directional) {
+            // From wherever mesh points are, a margin around the scene, to beyond its far side.
+            4.0 * scene.bounds().extent().length()
+        } else {
+            0.0
+        };
+        Self::new(&scene.lights, scene.falloff, reach)
+    }
+
+    /// Table of lights; occlusion rays to directional lights are `reach` long.
+    pub fn new(lights: &[PointLight], falloff: Falloff, reach: f32) -> Self {
         let mut order: Vec<usize> = (0..lights.len()).collect();
         let mut bounds = crate::scene::Bounds::EMPTY;
         lights.iter().for_each(|light| bounds.extend(light.position));
-        order.sort_by_key(|&i| (morton(lights[i].position, bounds), i));
+        order.sort_by_key(|&i| (lights[i].shape != LightShape::Point, morton(lights[i].position, bounds), i));
         let chunks = order
             .chunks(LANES)
             .map(|members| {
-                let mut chunk =
-                    LightChunk { position: [[0.0; LANES]; 3], intensity: [[0.0; LANES]; 3], used: 0 };
+                let zero = [[0.0; LANES]; 3];
+                let mut chunk = LightChunk { position: zero, shapes: None, intensity: zero, used: 0 };
                 for (lane, light) in members.iter().map(|&i| &lights[i]).enumerate() {
+                    let position = match light.shape {
+                        LightShape::Directional { direction } => direction * -reach.max(1.0),
+                        _ => light.position,
+                    };
+                    if light.shape != LightShape::Point {
+                        let shapes = chunk.shapes.get_or_insert_with(|| Box::new(ShapeLanes::POINTS));
+                        shapes.set(lane, light.shape);
+                    }
                     for axis in 0..3 {
-                        chunk.position[axis][lane] = light.position[axis];
+                        chunk.position[axis][lane] = position[axis];
                         chunk.intensity[axis][lane] = light.intensity[axis];
                     }
                     chunk.used |= 1 << lane;
@@ -175,15 +250,29 @@ impl LightTable {
         for (index, chunk) in self.chunks.iter().enumerate() {
             let Some(visible) = visibility(index) else { continue };
             let mut factor = [0.0f32; LANES];
-            for lane in 0..LANES {
-                let dx = chunk.position[0][lane] - y.x;
-                let dy = chunk.position[1][lane] - y.y;
-                let dz = chunk.position[2][lane] - y.z;
-                let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
-                let cosine = n.x * dx + n.y * dy + n.z * dz;
-                let side = g.x * dx + g.y * dy + g.z * dz;
-                let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
-                factor[lane] = visible[lane] * lit * attenuation.over_distance(distance);
+            if let Some(shapes) = &chunk.shapes {
+                for lane in 0..LANES {
+                    let d = chunk.way_from(lane, y.to_array());
+                    let [dx, dy, dz] = d;
+                    let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                    let cosine = n.x * dx + n.y * dy + n.z * dz;
+                    let side = g.x * dx + g.y * dy + g.z * dz;
+                    let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                    let share =
+                        shapes.cone(lane, d, distance) * shapes.over_distance(lane, attenuation, distance);
+                    factor[lane] = visible[lane] * lit * share;
+                }
+            } else {
+                for lane in 0..LANES {
+                    let dx = chunk.position[0][lane] - y.x;
+                    let dy = chunk.position[1][lane] - y.y;
+                    let dz = chunk.position[2][lane] - y.z;
+                    let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                    let cosine = n.x * dx + n.y * dy + n.z * dz;
+                    let side = g.x * dx + g.y * dy + g.z * dz;
+                    let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                    factor[lane] = visible[lane] * lit * attenuation.over_distance(distance);
+                }
             }
             for (sum, intensity) in sums.iter_mut().zip(&chunk.intensity) {
                 for lane in 0..LANES {
@@ -194,14 +283,23 @@ impl LightTable {
         Vec3::from_array(sums.map(|sum| horizontal_sum(&sum)))
     }
 
-    /// Calls `each(chunk, direction by axis, 1/φ1)` for every chunk as seen from the point `x`; directions are unit
-    /// length.
+    /// Calls `each(chunk, direction by axis, 1/φ1 times the cone's factor)` for every chunk as seen from the point `x`;
+    /// directions are unit length.
     #[inline(always)]
     pub fn for_each_chunk_from(&self, x: Vec3, mut each: impl FnMut(usize, &[Lanes; 3], &Lanes)) {
         with_attenuation!(self.falloff, attenuation => {
             for (index, chunk) in self.chunks.iter().enumerate() {
                 let mut direction = [[0.0f32; LANES]; 3];
                 let mut reciprocal = [0.0f32; LANES];
+                if let Some(shapes) = &chunk.shapes {
+                    for lane in 0..LANES {
+                        let d = chunk.way_from(lane, x.to_array());
+                        let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt().max(TINY_DISTANCE);
+                        (0..3).for_each(|axis| direction[axis][lane] = d[axis] / distance);
+                        let falloff = shapes.over_distance(lane, attenuation, distance) * distance;
+                        reciprocal[lane] = falloff * shapes.cone(lane, d, distance);
+                    }
+                } else {
                 for lane in 0..LANES {
                     let dx = chunk.position[0][lane] - x.x;
                     let dy = chunk.position[1][lane] - x.y;
@@ -212,6 +310,7 @@ impl LightTable {
                     direction[1][lane] = dy * inverse;
                     direction[2][lane] = dz * inverse;
                     reciprocal[lane] = attenuation.over_distance(distance) * distance;
+                }
                 }
                 each(index, &direction, &reciprocal);
             }
@@ -264,9 +363,9 @@ mod tests {
     #[test]
     fn illumination_matches_hand_computed_numbers() {
         let lights = [
-            PointLight { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::new(6.0, 3.0, 0.0) },
-            PointLight { position: Vec3::new(3f32.sqrt(), 1.0, 0.0), intensity: Vec3::splat(12.0) },
-            PointLight { position: Vec3::new(0.0, -1.0, 0.0), intensity: Vec3::splat(100.0) },
+            PointLight::new(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
+            PointLight::new(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
+            PointLight::new(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
         ];
         // φ2/φ1: linear 1/(1+2) and 0.5/(1+2); inverse square 1/4 and 0.5/4; none 1 and 0.5.
         for (falloff, expected) in [
@@ -274,7 +373,7 @@ mod tests {
             (Falloff::InverseSquare, Vec3::new(3.0, 2.25, 1.5)),
             (Falloff::None, Vec3::new(12.0, 9.0, 6.0)),
         ] {
-            let table = LightTable::new(&lights, falloff);
+            let table = LightTable::new(&lights, falloff, 0.0);
             let sum = table.illuminate(&surface(), |_| Some([1.0; LANES]));
             assert!(sum.abs_diff_eq(expected, 1e-5), "{falloff:?}: {sum} for {expected}");
             assert_eq!(table.illuminate(&surface(), |_| None), Vec3::ZERO);
@@ -284,13 +383,45 @@ mod tests {
     /// A light exactly at the lit point gives no NaN.
     #[test]
     fn a_light_at_the_point_is_finite() {
-        let light = PointLight { position: Vec3::ZERO, intensity: Vec3::ONE };
+        let light = PointLight::new(Vec3::ZERO, Vec3::ONE);
         for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
-            let table = LightTable::new(&[light], falloff);
+            let table = LightTable::new(&[light], falloff, 0.0);
             assert!(table.illuminate(&surface(), |_| Some([1.0; LANES])).is_finite());
             table.for_each_chunk_from(Vec3::ZERO, |_, direction, reciprocal| {
                 assert!(direction.iter().flatten().chain(reciprocal).all(|v| v.is_finite()));
             });
+        }
+    }
+
+    /// A spot light 2 above the point: full on its axis, a quarter half-way (in cosines) between the cones, nothing
+    /// beyond. A directional light has the cosine and no falloff, at any distance.
+    #[test]
+    fn spot_and_directional_lights_match_hand_computed_numbers() {
+        let above = Vec3::new(0.0, 2.0, 0.0);
+        let spot = |cosine: f32| PointLight {
+            position: above,
+            intensity: Vec3::splat(12.0),
+            shape: LightShape::Spot {
+                direction: Vec3::new((1.0 - cosine * cosine).sqrt(), -cosine, 0.0),
+                inner_cosine: 0.9,
+                outer_cosine: 0.5,
+            },
+        };
+        let direction = Vec3::new(3f32.sqrt() / 2.0, -0.5, 0.0);
+        let sun = PointLight {
+            position: above,
+            intensity: Vec3::splat(2.0),
+            shape: LightShape::Directional { direction },
+        };
+        // 12/2² = 3 on the axis; 3 · ((0.7 − 0.5)/(0.9 − 0.5))² = 3/4 at cosine 0.7; 2 · 0.5 from the sun.
+        for (light, expected) in [(spot(1.0), 3.0), (spot(0.7), 0.75), (spot(0.4), 0.0), (sun, 1.0)] {
+            let table = LightTable::new(&[light], Falloff::InverseSquare, 100.0);
+            let sum = table.illuminate(&surface(), |_| Some([1.0; LANES]));
+            assert!(sum.abs_diff_eq(Vec3::splat(expected), 1e-5), "{light:?}: {sum} for {expected}");
+            let mut reciprocals = 0.0;
+            table.for_each_chunk_from(Vec3::ZERO, |_, _, reciprocal| reciprocals += reciprocal[0]);
+            let cosine = if matches!(light.shape, LightShape::Directional { .. }) { 0.5 } else { 1.0 };
+            assert!((light.intensity.x * reciprocals * cosine - expected).abs() < 1e-5);
         }
     }
 }

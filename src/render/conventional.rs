@@ -44,14 +44,9 @@ fn see_lights_from_surface<A: Accel>(
             for point in 0..vertices.len() {
                 asked |= LaneMask::from(undecided[point * chunks + index] >> light & 1) << point;
             }
-            let position = chunk.position.map(|axis| axis[light]);
             let mut active: LaneMask = 0;
             for lane in 0..LANES {
-                let d = [
-                    position[0] - packet.org_x[lane],
-                    position[1] - packet.org_y[lane],
-                    position[2] - packet.org_z[lane],
-                ];
+                let d = chunk.way_from(light, [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]]);
                 let cosine = normals[0][lane] * d[0] + normals[1][lane] * d[1] + normals[2][lane] * d[2];
                 let side = normals[3][lane] * d[0] + normals[4][lane] * d[1] + normals[5][lane] * d[2];
                 packet.dir_x[lane] = d[0];

@@ -94,7 +94,7 @@ pub fn render_conventional(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> (Film, RenderStats) {
-    let lights = LightTable::new(&scene.lights, scene.falloff);
+    let lights = LightTable::of_scene(scene);
     with_accel!(backend, accel => {
         let mut integrator = ConventionalIntegrator { accel, lights, scale: direct_scale(settings) };
         wavefront(accel, scene, camera, settings, &mut integrator, progress)

@@ -44,7 +44,7 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
             accel,
             scene,
             settings,
-            lights: LightTable::new(&scene.lights, scene.falloff),
+            lights: LightTable::of_scene(scene),
             neighbourhoods: MeshPoints::new(scene.bounds(), &settings.light_mesh.points)?,
             sequence: (0..settings.reference_samples).map(sequence_point).collect(),
         })

@@ -2,13 +2,67 @@
 
 use glam::Vec3;
 
-/// Point light i of eq. (1).
+/// Point light i of eq. (1), or one of the two kinds of light that models bring beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// lp_i.
+    /// lp_i; without meaning for directional lights.
     pub position: Vec3,
     /// E_i, linear RGB, ≥ 0.
     pub intensity: Vec3,
+    /// Where the light goes.
+    pub shape: LightShape,
+}
+
+/// Where the light of a [`PointLight`] goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum LightShape {
+    /// Everywhere alike: the paper's.
+    #[default]
+    Point,
+    /// Into a cone: E_i is multiplied by [`LightShape::cone_factor`], V_i and φ1 are a point light's.
+    Spot {
+        /// Axis of the cone, unit length.
+        direction: Vec3,
+        /// Cosine of the angle from the axis up to which the light is full.
+        inner_cosine: f32,
+        /// Cosine of the angle beyond which there is none; at most `inner_cosine`.
+        outer_cosine: f32,
+    },
+    /// From infinitely far away: V_i is 0 where anything lies in the opposite of `direction`, however far, and φ1 is 1.
+    Directional {
+        /// The way the light travels, unit length.
+        direction: Vec3,
+    },
+}
+
+impl LightShape {
+    /// Slope and offset such that clamp(slope · c + offset, 0, 1)² is the share of E_i at the angle of cosine c from
+    /// the axis, as KHR_lights_punctual recommends.
+    pub fn cone_terms(self) -> (f32, f32) {
+        match self {
+            Self::Spot { inner_cosine, outer_cosine, .. } => {
+                // A cone without a soft rim still needs a finite slope.
+                let slope = 1.0 / (inner_cosine - outer_cosine).max(1e-3);
+                (slope, -outer_cosine * slope)
+            }
+            Self::Point | Self::Directional { .. } => (0.0, 1.0),
+        }
+    }
+
+    /// Share of E_i that goes along `direction` (unit length, away from the light).
+    pub fn cone_factor(self, direction: Vec3) -> f32 {
+        let Self::Spot { direction: axis, .. } = self else { return 1.0 };
+        let (slope, offset) = self.cone_terms();
+        let share = (slope * axis.dot(direction) + offset).clamp(0.0, 1.0);
+        share * share
+    }
+}
+
+impl PointLight {
+    /// A light that shines everywhere alike.
+    pub fn new(position: Vec3, intensity: Vec3) -> Self {
+        Self { position, intensity, shape: LightShape::Point }
+    }
 }
 
 /// φ1(t), what intensities are divided by at distance t.

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::TextureMap;
+
 /// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (spec §7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
@@ -17,6 +19,10 @@ pub struct Material {
     pub two_sided: bool,
     /// Whether camera and reflected rays pass through the back of a one-sided surface.
     pub cull: bool,
+    /// Picture that multiplies k_d.
+    pub diffuse_map: Option<TextureMap>,
+    /// Picture that multiplies Emiss.
+    pub emission_map: Option<TextureMap>,
 }
 
 impl Default for Material {
@@ -28,6 +34,8 @@ impl Default for Material {
             emission: Vec3::ZERO,
             two_sided: false,
             cull: false,
+            diffuse_map: None,
+            emission_map: None,
         }
     }
 }

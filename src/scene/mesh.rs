@@ -62,7 +62,7 @@ pub struct TriangleMesh {
     pub positions: Positions,
     /// Vertex indices, three per triangle; always within `positions`.
     pub triangles: Arc<Vec<[u32; 3]>>,
-    /// Shading normals per vertex, unit length.
+    /// Shading normals per vertex, unit length, or 0 where the triangle's own normal is meant.
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates per vertex.
     pub uvs: Option<Vec<[f32; 2]>>,

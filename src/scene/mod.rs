@@ -9,6 +9,7 @@ mod material;
 mod mesh;
 pub mod random;
 mod surface;
+mod texture;
 
 use std::sync::Arc;
 
@@ -16,10 +17,11 @@ use glam::Vec3;
 
 pub use bounds::Bounds;
 pub use camera::Camera;
-pub use light::{Falloff, PointLight};
+pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use surface::SurfacePoint;
+pub use texture::{Texture, TextureMap, Wrap};
 
 /// Everything that is rendered, in world space of any unit of length.
 #[derive(Clone, Default)]

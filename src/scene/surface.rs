@@ -1,8 +1,8 @@
 //! Surface points: what a ray found, with everything that shading needs.
 
-use glam::{Mat3A, Vec3, Vec3A};
+use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
-use super::Scene;
+use super::{Scene, TextureMap};
 use crate::accel::Hit;
 
 /// A visible surface point y (spec §1) with its material evaluated.
@@ -98,6 +98,17 @@ impl Scene {
 
         let material = &self.materials[mesh.materials.of(hit.triangle) as usize];
         let mut diffuse = material.diffuse;
+        let mut emission = if front || material.two_sided { material.emission } else { Vec3::ZERO };
+        if material.diffuse_map.is_some() || material.emission_map.is_some() {
+            let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
+                let [a, b, c] =
+                    mesh.triangles[hit.triangle as usize].map(|i| Vec2::from_array(uvs[i as usize]));
+                a * w + b * u + c * v
+            });
+            let color = |map: &Option<TextureMap>| map.as_ref().map_or(Vec3::ONE, |map| map.sample(uv).0);
+            diffuse *= color(&material.diffuse_map);
+            emission *= color(&material.emission_map);
+        }
         if let Some(colors) = &mesh.colors {
             let [a, b, c] =
                 mesh.triangles[hit.triangle as usize].map(|i| Vec3::from_array(colors[i as usize]));
@@ -110,7 +121,7 @@ impl Scene {
             shading_normal,
             diffuse,
             specular: material.specular,
-            emission: if front || material.two_sided { material.emission } else { Vec3::ZERO },
+            emission,
             front,
             two_sided: material.two_sided,
             culled: !front && material.cull && !material.two_sided,

@@ -2,6 +2,9 @@
 
 mod files;
 pub mod forest;
+pub mod interior;
+mod shapes;
+pub mod still_life;
 
 use std::io;
 use std::path::PathBuf;

@@ -51,6 +51,16 @@ pub enum LoadError {
         /// What is wrong.
         problem: String,
     },
+    /// A part of a file that has no lines breaks the format's rules, or asks for what is not supported.
+    #[error("{}: {}{problem}", file.display(), place_clause(place))]
+    Invalid {
+        /// The file.
+        file: PathBuf,
+        /// Where in it, in the format's terms, for instance `meshes[3].primitives[0]`; empty for the whole.
+        place: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// A model has nothing to render.
     #[error("{}: holds no triangles{}", file.display(), skipped_clause(skipped))]
     Empty {
@@ -70,7 +80,7 @@ pub enum LoadError {
         limit: u64,
     },
     /// The extension belongs to no known format.
-    #[error("{}: not a known model format (known: .obj)", file.display())]
+    #[error("{}: not a known model format (known: .glb, .gltf, .obj, .ply)", file.display())]
     UnknownFormat {
         /// The file.
         file: PathBuf,
@@ -84,6 +94,10 @@ fn reason(error: &io::Error) -> String {
         Some(end) => text[..end].to_lowercase(),
         None => text,
     }
+}
+
+fn place_clause(place: &str) -> String {
+    if place.is_empty() { String::new() } else { format!("{place}: ") }
 }
 
 fn skipped_clause(skipped: &Skipped) -> String {
@@ -103,6 +117,8 @@ pub struct Skipped {
     pub short_faces: u64,
     /// Triangles of zero area.
     pub zero_area_triangles: u64,
+    /// Instances that are squeezed flat.
+    pub flat_instances: u64,
     /// Normals without a direction, replaced by the face's own.
     pub bad_normals: u64,
     /// Texture coordinates that are not finite, replaced by 0.
@@ -116,13 +132,14 @@ impl Skipped {
     }
 
     /// The counts with the names that messages use.
-    pub fn named(&self) -> [(&'static str, u64); 7] {
+    pub fn named(&self) -> [(&'static str, u64); 8] {
         [
             ("line elements", self.lines),
             ("point elements", self.points),
             ("curves and surfaces", self.free_form),
             ("faces with fewer than three corners", self.short_faces),
             ("triangles of zero area", self.zero_area_triangles),
+            ("instances without volume", self.flat_instances),
             ("normals without a direction", self.bad_normals),
             ("texture coordinates that are not finite", self.bad_uvs),
         ]
@@ -135,6 +152,7 @@ impl Skipped {
         self.free_form += other.free_form;
         self.short_faces += other.short_faces;
         self.zero_area_triangles += other.zero_area_triangles;
+        self.flat_instances += other.flat_instances;
         self.bad_normals += other.bad_normals;
         self.bad_uvs += other.bad_uvs;
     }

@@ -33,9 +33,14 @@ pub struct MaterialOverride {
 
 impl MaterialOverride {
     fn apply(&self, material: &mut Material) {
-        material.diffuse = self.diffuse.unwrap_or(material.diffuse);
+        // A stated colour is the colour, not a factor of a picture.
+        if let Some(diffuse) = self.diffuse {
+            (material.diffuse, material.diffuse_map) = (diffuse, None);
+        }
+        if let Some(emission) = self.emission {
+            (material.emission, material.emission_map) = (emission, None);
+        }
         material.specular = self.specular.unwrap_or(material.specular);
-        material.emission = self.emission.unwrap_or(material.emission);
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
         material.cull = self.cull.unwrap_or(material.cull);
     }

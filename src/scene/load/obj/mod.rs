@@ -12,14 +12,13 @@ mod materials;
 mod statements;
 pub(super) mod text;
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 pub use statements::ChunkSizes;
 use statements::Statements;
 
-use super::{LoadError, Model};
+use super::{LoadError, Model, source};
 
 /// Reads an OBJ file and the MTL files that it names.
 ///
@@ -28,8 +27,7 @@ use super::{LoadError, Model};
 /// formed, states a coordinate that is not finite, or refers to a vertex that does not exist, and
 /// [`LoadError::Empty`] if no triangle is left.
 pub fn load_obj(path: &Path) -> Result<Model, LoadError> {
-    let file = File::open(path).map_err(|source| LoadError::Read { file: path.to_owned(), source })?;
-    read_obj(file, path, ChunkSizes::default())
+    read_obj(source::open(path)?, path, ChunkSizes::default())
 }
 
 /// Reads OBJ text from anywhere; `path` names it in messages, and MTL files are looked for beside it.

@@ -1,0 +1,183 @@
+//! The kernels of a light-mesh frame, one by one: cargo bench --bench kernels
+//!
+//! The scene is small and without geometry in the way, so that arithmetic is measured and not the memory.
+
+use std::sync::Arc;
+
+use divan::{Bencher, black_box};
+use glam::Vec3;
+use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayPacket};
+use lightmesh::light_mesh::{
+    Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
+    Scratch, directional,
+};
+use lightmesh::scene::random::SplitMix64;
+use lightmesh::scene::{
+    Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials,
+    TriangleMesh,
+};
+use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};
+
+fn main() {
+    divan::main();
+}
+
+const SURFACES: usize = 256;
+
+/// A thousand triangles in the unit box under `lights` lights.
+fn scene(lights: usize) -> Scene {
+    let mut random = SplitMix64::new(1);
+    let mut positions = Vec::new();
+    for _ in 0..1000 {
+        let corner = random.in_box(Vec3::ZERO, Vec3::ONE);
+        let mut near = || (corner + random.in_box(Vec3::splat(-0.03), Vec3::splat(0.03))).to_array();
+        positions.extend([near(), near(), near()]);
+    }
+    let count = positions.len() as u32 / 3;
+    let mesh = TriangleMesh {
+        name: String::new(),
+        positions: Positions::new(positions),
+        triangles: Arc::new((0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()),
+        normals: None,
+        uvs: None,
+        colors: None,
+        materials: TriangleMaterials::Uniform(0),
+        cutout: None,
+    };
+    let light = |_| PointLight {
+        position: random.in_box(Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.3, 1.0)),
+        intensity: Vec3::ONE,
+        shape: LightShape::Point,
+    };
+    Scene {
+        meshes: vec![Arc::new(mesh)],
+        instances: vec![Instance { mesh: 0, to_world: None }],
+        materials: vec![Material::default()],
+        lights: (0..lights).map(light).collect(),
+        ..Scene::default()
+    }
+}
+
+fn surfaces() -> Vec<SurfacePoint> {
+    let mut random = SplitMix64::new(2);
+    let surface = |_| {
+        let normal = random.in_box(Vec3::NEG_ONE, Vec3::ONE).normalize_or(Vec3::Y);
+        SurfacePoint {
+            position: random.in_box(Vec3::splat(0.2), Vec3::splat(0.8)),
+            offset: 1e-5,
+            geometric_normal: normal,
+            shading_normal: normal,
+            diffuse: Vec3::ONE,
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            front: true,
+            two_sided: false,
+            culled: false,
+        }
+    };
+    (0..SURFACES).map(surface).collect()
+}
+
+/// Spacing 1/20, R of `spacings` spacings.
+fn point_settings(spacings: f32) -> PointSettings {
+    PointSettings {
+        spacing: Spacing::Units(Vec3::splat(0.05)),
+        radius: Radius::Spacings(spacings),
+        leaks: Leaks::Allow,
+        ..PointSettings::default()
+    }
+}
+
+/// Finding D_y.
+#[divan::bench(args = [1.5, 3.0])]
+fn gather(bencher: Bencher, spacings: f32) {
+    let points = MeshPoints::new(scene(1).bounds(), &point_settings(spacings)).expect("a modest grid");
+    let surfaces = surfaces();
+    let mut neighbours = Neighbours::default();
+    bencher.counter(SURFACES).bench_local(|| {
+        for surface in &surfaces {
+            points.neighbours(black_box(surface), &mut neighbours);
+        }
+        neighbours.ids().len()
+    });
+}
+
+/// Σ E φ2/φ1 over the lights.
+#[divan::bench(args = [16, 100, 1000])]
+fn illuminate(bencher: Bencher, lights: usize) {
+    let scene = scene(lights);
+    let table = LightTable::of_scene(&scene);
+    let surfaces = surfaces();
+    bencher.counter(SURFACES).bench_local(|| {
+        let light = |surface| table.illuminate(black_box(surface), |_| Some([1.0; LANES]));
+        pulp::Arch::new().dispatch(|| surfaces.iter().map(light).sum::<Vec3>())
+    });
+}
+
+/// Irradiance of a normal from the directional basis.
+#[divan::bench]
+fn irradiance(bencher: Bencher) {
+    let coefficients = [0.1; directional::STRIDE];
+    let surfaces = surfaces();
+    bencher.counter(SURFACES).bench_local(|| {
+        let light = |surface: &SurfacePoint| {
+            directional::irradiance(black_box(&coefficients), surface.shading_normal)
+        };
+        surfaces.iter().map(light).sum::<Vec3>()
+    });
+}
+
+/// Tracing and summing up at mesh points, by what is kept.
+#[divan::bench(args = [Basis::Bits, Basis::Scalar, Basis::Directional])]
+fn evaluate(bencher: Bencher, basis: Basis) {
+    let scene = scene(100);
+    let accel = BvhAccel::build(&scene).expect("finite triangles");
+    let table = LightTable::of_scene(&scene);
+    let points: Vec<Vec3> = surfaces().iter().map(|surface| surface.position).collect();
+    bencher.counter(points.len()).bench_local(|| {
+        let mut values = DirectValues::default();
+        values.evaluate(&accel, &table, basis, black_box(&points))
+    });
+}
+
+/// Shading one surface point with all its mesh points known.
+#[divan::bench(args = [Estimator::PerLight, Estimator::Ratio, Estimator::Directional])]
+fn shade(bencher: Bencher, estimator: Estimator) {
+    let scene = scene(100);
+    let accel = BvhAccel::build(&scene).expect("finite triangles");
+    let settings =
+        LightMeshSettings { points: point_settings(1.5), estimator, ..LightMeshSettings::default() };
+    let mut mesh = DirectMesh::new(&scene, &settings).expect("a modest grid");
+    let surfaces = surfaces();
+    let mut needed = NeededPoints::default();
+    let mut neighbours = Neighbours::default();
+    for surface in &surfaces {
+        mesh.points.neighbours(surface, &mut neighbours);
+        neighbours.ids().iter().for_each(|&id| needed.insert(id));
+    }
+    mesh.evaluate(&accel, &scene, &PointMask::union(needed.into_bricks()));
+    let mut scratch = Scratch::default();
+    bencher.counter(SURFACES).bench_local(|| {
+        pulp::Arch::new().dispatch(|| {
+            surfaces.iter().map(|surface| mesh.illumination(&accel, surface, &mut scratch)).sum::<Vec3>()
+        })
+    });
+}
+
+/// One packet from neighbouring points towards one light.
+#[divan::bench(consts = [4, 8, 16])]
+fn occluded_packet<const N: usize>(bencher: Bencher) {
+    let scene = scene(1);
+    let accel = BvhAccel::build(&scene).expect("finite triangles");
+    let light = scene.lights[0].position;
+    let mut packet = RayPacket::<N>::empty();
+    for lane in 0..N {
+        let origin = Vec3::new(0.5 + 0.01 * lane as f32, 0.1, 0.5);
+        packet.set_lane(lane, &Ray::between(origin, light));
+    }
+    let active = ((1u64 << N) - 1) as u32;
+    bencher
+        .counter(N)
+        .with_inputs(|| packet)
+        .bench_local_refs(|packet| accel.occluded_packet(active, packet, Coherence::Coherent));
+}

@@ -1,0 +1,198 @@
+//! Error over time of light meshes, and the choice of the fastest ones that are good enough.
+
+use super::configuration::{Configuration, ESTIMATORS, LAYOUTS, conventional, estimator_name, layout_name};
+use super::report::{Plot, Report, Series, Table};
+use super::setup::{Setup, relative_rmse};
+use super::{BenchError, BenchOptions};
+use crate::accel::Backend;
+use crate::render::Film;
+use crate::settings::{Estimator, Settings};
+
+/// A configuration with what it costs and how far it is off.
+#[derive(Clone, Debug)]
+pub struct Tried {
+    /// The settings.
+    pub configuration: Configuration,
+    /// RMSE over the mean against the reference of the same estimator and R.
+    pub own_error: f64,
+    /// The same against the reference of `per-light`, which is eq. (3) of every light's visibility without
+    /// approximation.
+    pub exact_error: f64,
+    /// Seconds of a frame.
+    pub seconds: f64,
+}
+
+/// What the curve is measured on.
+struct Sizes {
+    /// Side of the pictures that are compared with references, pixels.
+    error_side: u32,
+    /// Side of the pictures that are timed.
+    time_side: u32,
+    reference_samples: u32,
+    spacings: &'static [f32],
+    radii: &'static [f32],
+}
+
+impl Sizes {
+    fn of(options: &BenchOptions) -> Self {
+        if options.quick {
+            let (spacings, radii): (&[f32], &[f32]) = (&[1.0], &[1.5]);
+            Self { error_side: 16, time_side: 32, reference_samples: 16, spacings, radii }
+        } else {
+            let spacings = &[0.75, 0.6, 0.5, 0.4, 0.3, 0.25];
+            Self { error_side: 100, time_side: 600, reference_samples: 256, spacings, radii: &[0.75, 1.5] }
+        }
+    }
+}
+
+/// Tries estimators × layouts × spacings for each radius; tables and plots go to the report.
+pub fn measure(
+    setup: &Setup,
+    backend: &Backend,
+    options: &BenchOptions,
+    report: &mut Report,
+    log: &dyn Fn(&str),
+) -> Result<Vec<Tried>, BenchError> {
+    let sizes = Sizes::of(options);
+    let mut all = Vec::new();
+    for &radius in sizes.radii {
+        let configuration = |estimator| Configuration {
+            estimator,
+            layout: LAYOUTS[0].clone(),
+            spacing: sizes.spacings[0],
+            radius,
+        };
+        let reference = |estimator| {
+            log(&format!("reference for {} at R {radius}", estimator_name(estimator)));
+            reference_film(
+                setup,
+                backend,
+                &configuration(estimator),
+                sizes.error_side,
+                sizes.reference_samples,
+            )
+        };
+        let exact = reference(Estimator::PerLight)?;
+        let hard = conventional(&setup.settings, (sizes.error_side, sizes.error_side));
+        let softness = relative_rmse(&exact, &setup.frame(backend, &hard)?.film)?;
+        let mut table = Table::new(
+            format!(
+                "Error over time at R = {radius}, {0}×{0} pixels; the picture it approximates differs from hard \
+                 shadows by {1:.1} %",
+                sizes.time_side,
+                100.0 * softness
+            ),
+            &["estimator", "layout", "spacing", "own error %", "against per-light %", "seconds"],
+        );
+        let mut plot = Plot {
+            title: format!("Error over time, R = {radius}"),
+            x: "seconds per frame".to_owned(),
+            y: "own error (RMSE / mean)".to_owned(),
+            series: Vec::new(),
+        };
+        for estimator in ESTIMATORS {
+            let own = if estimator == Estimator::PerLight { exact.clone() } else { reference(estimator)? };
+            for layout in &LAYOUTS {
+                let mut series = Series {
+                    label: format!("{} {}", estimator_name(estimator), layout_name(layout)),
+                    points: Vec::new(),
+                };
+                for &spacing in sizes.spacings.iter().filter(|&&spacing| spacing <= radius) {
+                    let layout = layout.clone();
+                    let configuration = Configuration { estimator, layout, spacing, radius };
+                    let tried = attempt(setup, backend, configuration, &sizes, [&own, &exact], report)?;
+                    series.points.push((tried.seconds, tried.own_error));
+                    table.rows.push(vec![
+                        estimator_name(estimator).to_owned(),
+                        layout_name(&tried.configuration.layout).to_owned(),
+                        spacing.to_string(),
+                        format!("{:.2}", 100.0 * tried.own_error),
+                        format!("{:.2}", 100.0 * tried.exact_error),
+                        format!("{:.4}", tried.seconds),
+                    ]);
+                    all.push(tried);
+                }
+                plot.series.push(series);
+            }
+        }
+        report.tables.push(table);
+        report.plots.push(plot);
+    }
+    Ok(all)
+}
+
+/// The picture that light meshes of a configuration approximate, `side` pixels wide and high.
+pub fn reference_film(
+    setup: &Setup,
+    backend: &Backend,
+    configuration: &Configuration,
+    side: u32,
+    samples: u32,
+) -> Result<Film, BenchError> {
+    let settings = configuration.reference(&setup.settings, (side, side), samples);
+    Ok(setup.frame(backend, &settings)?.film)
+}
+
+fn attempt(
+    setup: &Setup,
+    backend: &Backend,
+    configuration: Configuration,
+    sizes: &Sizes,
+    [own, exact]: [&Film; 2],
+    report: &mut Report,
+) -> Result<Tried, BenchError> {
+    let settings = |side| -> Settings { configuration.settings(&setup.settings, (side, side)) };
+    let film = setup.frame(backend, &settings(sizes.error_side))?.film;
+    // Three frames: the first one also warms the caches up.
+    let times: Result<Vec<f64>, _> =
+        (0..3).map(|_| setup.frame(backend, &settings(sizes.time_side)).map(|frame| frame.seconds)).collect();
+    let seconds = report.record(format!("curve: {configuration}"), times?);
+    Ok(Tried {
+        own_error: relative_rmse(&film, own)?,
+        exact_error: relative_rmse(&film, exact)?,
+        configuration,
+        seconds,
+    })
+}
+
+/// The fastest configuration whose errors, own and exact, are both within `limit`; if there is none, the one with the
+/// smallest errors. Estimators that don't converge to the conventional picture are left out.
+pub fn fastest_within(tried: &[Tried], limit: f64) -> Option<&Tried> {
+    let worst = |tried: &Tried| tried.own_error.max(tried.exact_error);
+    let converging = |tried: &&Tried| {
+        matches!(tried.configuration.estimator, Estimator::PerLight | Estimator::Directional)
+    };
+    let candidates = || tried.iter().filter(converging);
+    candidates()
+        .filter(|tried| worst(tried) <= limit)
+        .min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+        .or_else(|| candidates().min_by(|a, b| worst(a).total_cmp(&worst(b))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tried(estimator: Estimator, own_error: f64, exact_error: f64, seconds: f64) -> Tried {
+        let configuration =
+            Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: 1.0, radius: 1.0 };
+        Tried { configuration, own_error, exact_error, seconds }
+    }
+
+    /// The fastest is taken only among those that are good enough by both measures and converge to the right picture.
+    #[test]
+    fn speed_never_buys_error() {
+        let all = [
+            tried(Estimator::Paper, 0.01, 0.01, 0.1),
+            tried(Estimator::Directional, 0.04, 0.11, 0.2),
+            tried(Estimator::PerLight, 0.09, 0.09, 0.4),
+            tried(Estimator::PerLight, 0.08, 0.08, 0.3),
+        ];
+        assert_eq!(fastest_within(&all, 0.1).unwrap().seconds, 0.3);
+        assert_eq!(
+            fastest_within(&all, 0.01).unwrap().seconds,
+            0.3,
+            "the smallest error where none is within"
+        );
+    }
+}

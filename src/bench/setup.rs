@@ -1,0 +1,115 @@
+//! The scene that is measured, and single frames of it.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::Vec3;
+
+use super::machine::Machine;
+use super::report::Report;
+use super::timing::timed;
+use super::{BenchError, BenchOptions};
+use crate::accel::Backend;
+use crate::image::Image;
+use crate::image::metrics::{MetricsOptions, compare};
+use crate::light_mesh::MeshError;
+use crate::render::{Film, RenderStats, render};
+use crate::scene::generate::forest::Forest;
+use crate::scene::load::load_scene_file;
+use crate::scene::{Camera, Scene};
+use crate::settings::Settings;
+
+/// Triangles of the paper's forest.
+pub const PAPER_TRIANGLES: u32 = 23_542;
+/// Its lights.
+pub const PAPER_LIGHTS: u32 = 100;
+
+/// A scene with its camera.
+pub struct Setup {
+    /// The scene.
+    pub scene: Scene,
+    /// Its camera.
+    pub camera: Camera,
+    /// Its settings.
+    pub settings: Settings,
+    /// Seconds to read it.
+    pub load_seconds: f64,
+}
+
+/// A frame and its time.
+pub struct Frame {
+    /// The picture.
+    pub film: Film,
+    /// Counters and seconds per stage.
+    pub stats: RenderStats,
+    /// Wall-clock seconds of the whole frame, from nothing but scene and acceleration structure.
+    pub seconds: f64,
+}
+
+/// A folder that is removed when it goes out of use.
+pub struct TemporaryFolder(pub PathBuf);
+
+impl TemporaryFolder {
+    /// A folder of a name that nobody else uses; it is created by whoever writes into it.
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("lightmesh-bench-{}-{number}", std::process::id());
+        Self(std::env::temp_dir().join(name))
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        // What can't be removed stays in the system's folder for temporary files.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The forest of `lightmesh generate forest`, written and read like any scene.
+///
+/// The sky is black: it would add to the image's mean, by which errors are divided, but never to the errors.
+pub fn forest(triangles: u32, lights: u32) -> Result<Setup, BenchError> {
+    let folder = TemporaryFolder::new();
+    Forest { triangles, lights, seed: 1 }.write(&folder.0)?;
+    let (load_seconds, loaded) = timed(|| load_scene_file(&folder.0.join("forest.toml")));
+    let loaded = loaded?;
+    let mut scene = loaded.scene;
+    scene.background = Vec3::ZERO;
+    let camera = loaded.cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
+    Ok(Setup { scene, camera, settings: loaded.settings, load_seconds })
+}
+
+impl Setup {
+    /// Renders a frame; light meshes start with no point known.
+    pub fn frame(&self, backend: &Backend, settings: &Settings) -> Result<Frame, MeshError> {
+        let (seconds, rendered) = timed(|| render(backend, &self.scene, &self.camera, settings, &()));
+        let (film, stats) = rendered?;
+        Ok(Frame { film, stats, seconds })
+    }
+}
+
+/// Root of the mean squared difference of two pictures over the mean of the second.
+pub fn relative_rmse(film: &Film, reference: &Film) -> Result<f64, BenchError> {
+    let image = |film: &Film| Image::from_pixels(film.resolution.0, film.resolution.1, film.pixels.clone());
+    // Pictures of one size can be compared; a black reference has no relative error.
+    let metrics = compare(&image(film)?, &image(reference)?, MetricsOptions::default()).ok();
+    Ok(metrics.and_then(|metrics| metrics.relative_rmse).unwrap_or(f64::NAN))
+}
+
+/// An empty report.
+pub fn new_report(benchmark: &'static str, backend: String, options: &BenchOptions) -> Report {
+    Report {
+        benchmark,
+        version: env!("CARGO_PKG_VERSION"),
+        machine: Machine::here(),
+        backend,
+        threads: rayon::current_num_threads(),
+        quick: options.quick,
+        measurements: Vec::new(),
+        goals: Vec::new(),
+        tables: Vec::new(),
+        plots: Vec::new(),
+    }
+}

@@ -1,0 +1,185 @@
+//! What the rendering tests share: small scenes made by hand, and renders with the best backend there is.
+
+#![allow(dead_code, reason = "every test file uses a part")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use lightmesh::accel::{Backend, BackendChoice, BvhAccel};
+use lightmesh::light_mesh::{DirectMesh, NeededPoints, Neighbours, PointMask, Scratch};
+use lightmesh::render::{Film, LightMeshes, RenderStats, render, render_light_mesh};
+use lightmesh::scene::generate::forest::Forest;
+use lightmesh::scene::load::{LoadedScene, load_scene_file};
+use lightmesh::scene::{
+    Camera, Falloff, Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint,
+    TriangleMaterials, TriangleMesh,
+};
+use lightmesh::settings::{Integrator, LightMeshSettings, Settings};
+
+/// Triangles by hand, with a material each.
+#[derive(Default)]
+pub struct Builder {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    materials: Vec<u32>,
+}
+
+impl Builder {
+    pub fn triangle(&mut self, corners: [Vec3; 3], material: u32) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(corners.map(|corner| corner.to_array()));
+        self.triangles.push([first, first + 1, first + 2]);
+        self.materials.push(material);
+    }
+
+    /// A parallelogram whose front is the side that `u × v` points to.
+    pub fn quad(&mut self, corner: Vec3, u: Vec3, v: Vec3, material: u32) {
+        self.triangle([corner, corner + u, corner + u + v], material);
+        self.triangle([corner, corner + u + v, corner + v], material);
+    }
+
+    /// A box; its fronts point outwards, or inwards for a room.
+    pub fn cuboid(&mut self, min: Vec3, max: Vec3, inwards: bool, material: u32) {
+        let size = max - min;
+        let (x, y, z) = (Vec3::X * size, Vec3::Y * size, Vec3::Z * size);
+        for (u, v, w) in [(x, y, z), (y, z, x), (z, x, y)] {
+            let (far, near) = if inwards { ((v, u), (u, v)) } else { ((u, v), (v, u)) };
+            self.quad(min + w, far.0, far.1, material);
+            self.quad(min, near.0, near.1, material);
+        }
+    }
+
+    /// A few tiny triangles at the corners of a box, which make it part of the scene's bounds.
+    pub fn stretch_bounds(&mut self, min: Vec3, max: Vec3) {
+        for corner in [min, max] {
+            self.triangle([corner, corner + Vec3::X * 1e-4, corner + Vec3::Y * 1e-4], 0);
+        }
+    }
+
+    pub fn scene(self, materials: Vec<Material>, lights: Vec<PointLight>, falloff: Falloff) -> Scene {
+        let mesh = TriangleMesh {
+            name: String::new(),
+            positions: Positions::new(self.positions),
+            triangles: Arc::new(self.triangles),
+            normals: None,
+            uvs: None,
+            colors: None,
+            materials: TriangleMaterials::PerTriangle(self.materials),
+            cutout: None,
+        };
+        Scene {
+            meshes: vec![Arc::new(mesh)],
+            instances: vec![Instance { mesh: 0, to_world: None }],
+            materials,
+            lights,
+            falloff,
+            background: Vec3::ZERO,
+        }
+    }
+}
+
+pub fn grey(diffuse: f32) -> Material {
+    Material { diffuse: Vec3::splat(diffuse), ..Material::default() }
+}
+
+pub fn light(position: Vec3, intensity: Vec3) -> PointLight {
+    PointLight { position, intensity, shape: LightShape::Point }
+}
+
+pub fn camera(position: Vec3, look_at: Vec3, vertical_fov: f32) -> Camera {
+    Camera { name: String::new(), position, look_at, up: Vec3::Y, vertical_fov }
+}
+
+/// Embree where it is installed, the built-in BVH elsewhere.
+pub fn backend(scene: &Scene) -> Backend {
+    Backend::build(BackendChoice::Auto, scene).expect("a backend").backend
+}
+
+/// Renders with the integrator that the settings name.
+pub fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Film, RenderStats) {
+    render(&backend(scene), scene, camera, settings, &()).expect("a picture")
+}
+
+/// The same with light meshes that outlive the render.
+pub fn picture_with(
+    backend: &Backend,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    meshes: &mut LightMeshes,
+) -> (Film, RenderStats) {
+    render_light_mesh(backend, scene, camera, settings, meshes, &())
+}
+
+/// The conventional picture with otherwise the same settings.
+pub fn conventional(scene: &Scene, camera: &Camera, settings: &Settings) -> (Film, RenderStats) {
+    picture(scene, camera, &Settings { integrator: Integrator::Conventional, ..settings.clone() })
+}
+
+/// A surface point of white material in free space.
+pub fn surface_point(position: Vec3, normal: Vec3) -> SurfacePoint {
+    SurfacePoint {
+        position,
+        offset: 1e-5,
+        geometric_normal: normal,
+        shading_normal: normal,
+        diffuse: Vec3::ONE,
+        specular: Vec3::ZERO,
+        emission: Vec3::ZERO,
+        front: true,
+        two_sided: false,
+        culled: false,
+    }
+}
+
+/// I(y) at surface points, which need not lie on any geometry.
+pub fn direct_illumination(
+    scene: &Scene,
+    settings: &LightMeshSettings,
+    surfaces: &[SurfacePoint],
+) -> Vec<Vec3> {
+    let mut mesh = DirectMesh::new(scene, settings).expect("a light mesh");
+    let mut needed = NeededPoints::default();
+    let mut neighbours = Neighbours::default();
+    for surface in surfaces {
+        mesh.points.neighbours(surface, &mut neighbours);
+        neighbours.ids().iter().for_each(|&id| needed.insert(id));
+    }
+    let needed = PointMask::union(needed.into_bricks());
+    let mut scratch = Scratch::default();
+    let accel = BvhAccel::build(scene).expect("a BVH");
+    mesh.evaluate(&accel, scene, &needed);
+    surfaces.iter().map(|surface| mesh.illumination(&accel, surface, &mut scratch)).collect()
+}
+
+/// The generated forest as `lightmesh generate forest` writes it.
+pub fn forest(triangles: u32, lights: u32) -> LoadedScene {
+    let folder = tempfile::tempdir().expect("a folder");
+    Forest { triangles, lights, seed: 1 }.write(folder.path()).expect("a forest");
+    load_scene_file(&folder.path().join("forest.toml")).expect("the forest")
+}
+
+/// Mean over pixels and channels.
+pub fn mean(film: &Film) -> f64 {
+    let sum: f64 = film.pixels.iter().flatten().map(|&value| f64::from(value)).sum();
+    sum / (3 * film.pixels.len()) as f64
+}
+
+/// Root of the mean squared difference over the mean of `reference`.
+pub fn relative_rmse(film: &Film, reference: &Film) -> f64 {
+    assert_eq!(film.resolution, reference.resolution);
+    let squares: f64 = film
+        .pixels
+        .iter()
+        .flatten()
+        .zip(reference.pixels.iter().flatten())
+        .map(|(a, b)| f64::from(a - b).powi(2))
+        .sum();
+    (squares / (3 * film.pixels.len()) as f64).sqrt() / mean(reference)
+}
+
+/// The bits of all channels: equal exactly if the pictures are.
+pub fn bits(film: &Film) -> Vec<u32> {
+    film.pixels.iter().flatten().map(|value| value.to_bits()).collect()
+}
