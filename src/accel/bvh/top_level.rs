@@ -184,11 +184,13 @@ impl BvhAccel {
                 found
             };
             let mut stack = [0; STACK];
+            let mut group_stack = [0; STACK];
             blocked |= any_hit_packet::<K, S, W, STACK>(
                 &self.instances.tree,
                 simd,
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit| match visit {
                     Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes),
@@ -222,6 +224,7 @@ impl BvhAccel {
         }
         let mut remaining = rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [(0, 0, 0.0); STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -244,6 +247,7 @@ impl BvhAccel {
                 simd,
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit, rays| match visit {
                     Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes, rays),
