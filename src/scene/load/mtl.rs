@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::obj::text::{Lines, decode, parse_f32, tokens};
+use super::obj::text::{Lines, decode, parse_f32, split_word, tokens};
 use super::{LoadError, Warning};
 use crate::scene::Material;
 
@@ -45,9 +45,7 @@ pub fn parse_mtl(text: &[u8], path: &Path) -> Result<MtlFile, LoadError> {
     let mut current: Option<Open> = None;
     for (line, content) in Lines::new(text) {
         let fail = |problem: String| LoadError::Line { file: path.to_owned(), line, problem };
-        let content = content.trim_ascii();
-        let end = content.iter().position(u8::is_ascii_whitespace).unwrap_or(content.len());
-        let (keyword, rest) = content.split_at(end);
+        let (keyword, rest) = split_word(content);
         if keyword == b"newmtl" {
             file.close(current.take(), path);
             let name = decode(rest.trim_ascii());
