@@ -49,7 +49,9 @@ impl Soup {
     fn obj(&self) -> String {
         let mut text = String::new();
         self.positions.iter().for_each(|[x, y, z]| writeln!(text, "v {x:?} {y:?} {z:?}").unwrap());
-        self.triangles.iter().for_each(|t| writeln!(text, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap());
+        self.triangles
+            .iter()
+            .for_each(|t| writeln!(text, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap());
         text
     }
 
