@@ -43,6 +43,7 @@ pub struct RenderArgs {
     /// Camera to look through, by name
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Settings that override the scene's.
     #[command(flatten)]
     pub overrides: Overrides,
 }
