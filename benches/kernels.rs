@@ -2,6 +2,8 @@
 //!
 //! The scene is small and without geometry in the way, so that arithmetic is measured and not the memory.
 
+#![allow(clippy::expect_used, reason = "a benchmark that cannot set up has nothing to measure")]
+
 use std::sync::Arc;
 
 use divan::{Bencher, black_box};

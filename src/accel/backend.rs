@@ -27,7 +27,7 @@ pub enum Backend {
     #[cfg(feature = "embree")]
     Embree(EmbreeAccel),
     /// The pure-Rust BVH.
-    Bvh(BvhAccel),
+    Bvh(Box<BvhAccel>),
     /// A loop over all triangles.
     BruteForce(BruteForceAccel),
 }
@@ -55,7 +55,10 @@ macro_rules! with_accel {
         match $backend {
             #[cfg(feature = "embree")]
             $crate::accel::Backend::Embree($accel) => $body,
-            $crate::accel::Backend::Bvh($accel) => $body,
+            $crate::accel::Backend::Bvh(boxed) => {
+                let $accel = &**boxed;
+                $body
+            }
             $crate::accel::Backend::BruteForce($accel) => $body,
         }
     };
@@ -78,7 +81,7 @@ impl Backend {
     pub fn build(choice: BackendChoice, scene: &Scene) -> Result<Chosen, BackendError> {
         let plain = |backend| Ok(Chosen { backend, notice: None });
         match choice {
-            BackendChoice::Bvh => plain(Self::Bvh(BvhAccel::build(scene)?)),
+            BackendChoice::Bvh => plain(Self::Bvh(Box::new(BvhAccel::build(scene)?))),
             BackendChoice::BruteForce => plain(Self::BruteForce(BruteForceAccel::new(scene))),
             #[cfg(feature = "embree")]
             BackendChoice::Embree => plain(Self::Embree(EmbreeAccel::build(scene)?)),
@@ -91,7 +94,7 @@ impl Backend {
                         "{cause}; using the built-in BVH, which is slower. To use Embree, install the package \
                          libembree3-3 (Debian 12) or libembree4-4 (Debian 13)"
                     );
-                    Ok(Chosen { backend: Self::Bvh(BvhAccel::build(scene)?), notice: Some(notice) })
+                    Ok(Chosen { backend: Self::Bvh(Box::new(BvhAccel::build(scene)?)), notice: Some(notice) })
                 }
                 Err(error) => Err(error.into()),
             },
@@ -100,7 +103,7 @@ impl Backend {
             #[cfg(not(feature = "embree"))]
             BackendChoice::Auto => {
                 let notice = "this build has no Embree support; using the slower built-in BVH".to_owned();
-                Ok(Chosen { backend: Self::Bvh(BvhAccel::build(scene)?), notice: Some(notice) })
+                Ok(Chosen { backend: Self::Bvh(Box::new(BvhAccel::build(scene)?)), notice: Some(notice) })
             }
         }
     }

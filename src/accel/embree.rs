@@ -44,7 +44,7 @@ pub enum EmbreeError {
 /// Vertices and triangles are shared with the scene, not copied. Meshes in world space are geometries
 /// of the top-level scene; placed ones are built once and instanced. Traversal is robust, so rays don't
 /// slip through shared edges. Triangles with coordinates that are not finite, or beyond ±1.8·10¹⁸,
-/// are never hit.
+/// are never hit, nor are instances whose transform has no inverse.
 pub struct EmbreeAccel {
     scene: embree_sys::Scene,
 }
@@ -86,7 +86,11 @@ impl EmbreeAccel {
                             placed.entry(instance.mesh).or_insert(object)
                         }
                     };
-                    Geometry::instance(object, columns(to_world)).map_err(mesh_error)?
+                    match Geometry::instance(object, columns(to_world)) {
+                        // Rays cannot be brought into its space: never hit, as in the other backends.
+                        Err(Error::Transform) => continue,
+                        geometry => geometry.map_err(mesh_error)?,
+                    }
                 }
             };
             top.attach(id, geometry).map_err(mesh_error)?;

@@ -9,9 +9,12 @@ use super::{BenchError, BenchOptions};
 use crate::accel::Backend;
 use crate::settings::Settings;
 
+/// Side in pixels, lights, goals for the two meshes, goal in units of the camera rays.
+type CaseGoals = (u32, u32, [Option<f64>; 2], Option<f64>);
+
 /// Pictures that are compared: side in pixels, lights, goals for the two meshes (times faster), and the goal for the
 /// light-mesh frame in units of the camera rays alone.
-const CASES: [(u32, u32, [Option<f64>; 2], Option<f64>); 3] = [
+const CASES: [CaseGoals; 3] = [
     (600, 100, [Some(10.0), Some(4.0)], Some(4.0)),
     (2400, 100, [Some(20.0), None], Some(2.0)),
     (1200, 1000, [Some(25.0), None], None),

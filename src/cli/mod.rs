@@ -5,6 +5,8 @@ pub mod compare;
 pub mod gallery;
 mod gallery_page;
 pub mod generate;
+pub mod info;
+pub mod init;
 mod progress;
 pub mod render;
 mod stats_file;
@@ -26,6 +28,10 @@ struct Cli {
 enum Command {
     /// Render a scene file to a picture.
     Render(Box<render::RenderArgs>),
+    /// Tell what a scene file or model holds.
+    Info(info::InfoArgs),
+    /// Write a scene file for a model, with the camera, lights and settings that were chosen.
+    Init(init::InitArgs),
     /// Write a procedural scene.
     Generate(generate::GenerateArgs),
     /// Measure speed.
@@ -54,6 +60,12 @@ pub fn main() -> ExitCode {
     let mut out = io::stdout().lock();
     let result = match &cli.command {
         Command::Render(args) => render::run(args).map_err(anything),
+        Command::Info(args) => match info::run(args, &mut out) {
+            Ok(()) => Ok(()),
+            Err(info::InfoError::Output(error)) => Err(anything(error)),
+            Err(error) => Err(anything(error)),
+        },
+        Command::Init(args) => init::run(args).map_err(anything),
         Command::Generate(args) => generate::run(args).map_err(anything),
         Command::Bench(args) => match bench::run(args, &mut out) {
             Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),

@@ -13,14 +13,14 @@ use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{Image, ImageError, exr::SampleType};
 use crate::light_mesh::MeshError;
 use crate::render::{Film, RenderStats, render};
-use crate::scene::load::{LoadError, LoadedScene, load_scene_file};
+use crate::scene::load::{LoadError, LoadedScene, OpenedScene, auto_exposure, open_scene};
 use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Settings, Spacing};
 use crate::with_accel;
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML)
+    /// Scene file (TOML) or model (.glb, .gltf, .obj, .ply; also .gz and .zst)
     pub scene: PathBuf,
     /// Picture to write, .exr or .png; may be given several times
     #[arg(short, long = "output", value_name = "FILE", required = true)]
@@ -43,6 +43,7 @@ pub struct RenderArgs {
     /// Camera to look through, by name
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Settings that override the scene's.
     #[command(flatten)]
     pub overrides: Overrides,
 }
@@ -224,13 +225,17 @@ fn render_to(
     let mut seconds = Seconds::default();
 
     let spinner = reporter.spinner("reading");
-    let LoadedScene { scene, cameras, mut settings, skipped, warnings } = load_scene_file(&args.scene)?;
+    let OpenedScene { loaded, choices, auto_exposure: exposure_follows } = open_scene(&args.scene)?;
+    let LoadedScene { scene, cameras, mut settings, skipped, warnings } = loaded;
     spinner.finish_and_clear();
     for warning in &warnings {
         reporter.line(&format!("warning: {warning}"));
     }
     if !skipped.is_empty() {
         reporter.line(&format!("warning: {}: left out {skipped}", args.scene.display()));
+    }
+    for choice in &choices {
+        reporter.line(&format!("note: {choice}"));
     }
     args.overrides.apply(&mut settings);
     let camera = match &args.camera {
@@ -263,6 +268,10 @@ fn render_to(
 
     let stage = Instant::now();
     let Film { resolution: (width, height), pixels } = film;
+    if exposure_follows && args.overrides.exposure.is_none() {
+        settings.exposure = auto_exposure(&pixels);
+        reporter.line(&format!("note: exposure {:+} stops", settings.exposure));
+    }
     let image = Image::from_pixels(width, height, pixels)?;
     let non_finite_pixels = image.non_finite_pixels();
     if non_finite_pixels > 0 {

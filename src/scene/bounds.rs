@@ -44,6 +44,15 @@ impl Bounds {
     }
 }
 
+impl super::TriangleMesh {
+    /// Box around the vertices in object space.
+    pub fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        self.positions.as_slice().iter().for_each(|&position| bounds.extend(position.into()));
+        bounds
+    }
+}
+
 impl super::Scene {
     /// Box around all triangles in world space.
     pub fn bounds(&self) -> Bounds {

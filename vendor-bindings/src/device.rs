@@ -88,8 +88,8 @@ impl Device {
         usize::try_from(self.0.state.memory.load(Ordering::Relaxed)).unwrap_or(0)
     }
 
-    /// Whether packets of `width` rays are traversed as such; others are taken apart by Embree, with
-    /// the same results.
+    /// Whether packets of `width` rays are traversed as such; others are traced ray by ray, with the
+    /// same results.
     pub fn native_packets(&self, width: usize) -> bool {
         let property = match width {
             1 => return true,

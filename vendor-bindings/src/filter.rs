@@ -48,8 +48,8 @@ impl Filter {
     /// into C.
     fn keeps(&self, prim_id: u32, u: f32, v: f32) -> bool {
         catch_unwind(AssertUnwindSafe(|| (self.opacity)(prim_id, u, v))).unwrap_or_else(|payload| {
-            // Its destructor might panic again.
-            mem::forget(payload);
+            // Its destructor might panic again, and what that throws is not worth another attempt.
+            let _ = catch_unwind(AssertUnwindSafe(|| drop(payload))).map_err(mem::forget);
             self.device.count_filter_panic();
             true
         })

@@ -100,8 +100,8 @@ impl<const N: usize> RayPacket<N> {
 
     /// Which lanes hold a ray that can hit something: −1 for those, 0 for the others.
     ///
-    /// Origin and direction must lie within ±`largest` (so they aren't NaN), and the interval must be one:
-    /// 0 ≤ `tnear` ≤ `tfar`.
+    /// Origin and direction must lie within ±`largest` (so they aren't NaN), and the interval must be
+    /// one: `tnear` ≤ `tfar` and 0 ≤ `tfar`.
     #[inline(always)]
     pub fn valid_lanes(&self, largest: f32) -> [i32; N] {
         let mut valid = [0; N];
@@ -112,7 +112,7 @@ impl<const N: usize> RayPacket<N> {
                 & (self.dir_x[lane].abs() <= largest)
                 & (self.dir_y[lane].abs() <= largest)
                 & (self.dir_z[lane].abs() <= largest);
-            let interval = (self.tnear[lane] >= 0.0) & (self.tfar[lane] >= self.tnear[lane]);
+            let interval = (self.tfar[lane] >= self.tnear[lane]) & (self.tfar[lane] >= 0.0);
             *valid = -i32::from(within & interval);
         }
         valid

@@ -1,8 +1,8 @@
 //! Ray queries against a committed scene. None of them can fail or allocate.
 //!
 //! Rays that are none hit nothing: a component of origin or direction that is NaN or larger than
-//! [`Scene::largest_coordinate`], or an interval without 0 ≤ tnear ≤ tfar. They are kept from Embree,
-//! whose Debian builds have assertions on and abort on them.
+//! [`Scene::largest_coordinate`], or an empty interval. They are kept from Embree, whose Debian builds
+//! have assertions on and abort on them. So they do on `tnear` < 0, which counts as 0 here.
 
 use std::ptr;
 
@@ -18,7 +18,7 @@ pub struct Ray {
     pub origin: [f32; 3],
     /// Direction; t is in units of its length.
     pub direction: [f32; 3],
-    /// Start of the valid interval, ≥ 0.
+    /// Start of the valid interval; below 0 it counts as 0.
     pub tnear: f32,
     /// End of the valid interval.
     pub tfar: f32,
@@ -29,7 +29,8 @@ impl Ray {
     #[inline(always)]
     fn is_valid(&self, largest: f32) -> bool {
         let within = |v: &[f32; 3]| v.iter().all(|x| x.abs() <= largest);
-        within(&self.origin) && within(&self.direction) && self.tnear >= 0.0 && self.tfar >= self.tnear
+        let interval = self.tfar >= self.tnear && self.tfar >= 0.0;
+        within(&self.origin) && within(&self.direction) && interval
     }
 }
 
@@ -70,9 +71,9 @@ const FOUR_LANES: [[i32; 4]; 16] = {
 };
 
 impl Valid {
-    /// The active lanes whose rays Embree takes.
+    /// The active lanes whose rays Embree takes; their `tnear` is made to be at least 0.
     #[inline(always)]
-    fn new<const N: usize>(active: u32, rays: &RayPacket<N>, largest: f32) -> Self {
+    fn new<const N: usize>(active: u32, rays: &mut RayPacket<N>, largest: f32) -> Self {
         let mut valid = Self([0; 16]);
         let usable = rays.valid_lanes(largest);
         for (quad, (lanes, usable)) in valid.0.chunks_exact_mut(4).zip(usable.chunks_exact(4)).enumerate() {
@@ -80,6 +81,10 @@ impl Valid {
             for ((lane, usable), wanted) in lanes.iter_mut().zip(usable).zip(wanted) {
                 *lane = usable & wanted;
             }
+        }
+        for (tnear, valid) in rays.tnear.iter_mut().zip(&valid.0) {
+            // No branch, so that it vectorises. No valid lane's is NaN.
+            *tnear = if (*valid != 0) & (*tnear < 0.0) { 0.0 } else { *tnear };
         }
         valid
     }
@@ -140,7 +145,7 @@ fn raw_ray(ray: &Ray) -> v4::RTCRay {
         org_x,
         org_y,
         org_z,
-        tnear: ray.tnear,
+        tnear: ray.tnear.max(0.0),
         dir_x,
         dir_y,
         dir_z,
@@ -227,7 +232,10 @@ impl Scene {
         coherent: bool,
     ) {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
-        let lanes = Valid::new(active, &packet.ray, self.largest_coordinate());
+        let lanes = Valid::new(active, &mut packet.ray, self.largest_coordinate());
+        if !self.is_native(N) {
+            return self.intersect_lanes(&lanes, packet);
+        }
         let (valid, scene, packet) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
         // SAFETY: the scene is committed; flags and packet are aligned and of the layout of N lanes
         // (see `layout`); the packet is borrowed mutably.
@@ -264,6 +272,9 @@ impl Scene {
     ) -> u32 {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
         let lanes = Valid::new(active, packet, self.largest_coordinate());
+        if !self.is_native(N) {
+            return self.occluded_lanes(&lanes, packet);
+        }
         let (valid, scene, rays) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
         // SAFETY: as in `intersect_packet`.
         unsafe {
@@ -289,5 +300,43 @@ impl Scene {
             }
         }
         blocked(&lanes, &packet.tfar)
+    }
+
+    /// [`Scene::intersect_packet`] where the processor has no such packets. Version 3 would pass over the
+    /// lane mask there, and trace inactive lanes as well.
+    #[cold]
+    fn intersect_lanes<const N: usize>(&self, lanes: &Valid, packet: &mut RayHitPacket<N>) {
+        for lane in (0..N).filter(|lane| lanes.0[*lane] != 0) {
+            if let Some(hit) = self.intersect1(&ray_of_lane(&packet.ray, lane)) {
+                packet.ray.tfar[lane] = hit.t;
+                packet.hit.u[lane] = hit.u;
+                packet.hit.v[lane] = hit.v;
+                packet.hit.prim_id[lane] = hit.prim_id;
+                packet.hit.geom_id[lane] = hit.geom_id;
+                packet.hit.inst_id[lane] = hit.inst_id;
+            }
+        }
+    }
+
+    /// [`Scene::occluded_packet`] in the same case.
+    #[cold]
+    fn occluded_lanes<const N: usize>(&self, lanes: &Valid, packet: &mut RayPacket<N>) -> u32 {
+        let mut mask = 0;
+        for lane in (0..N).filter(|lane| lanes.0[*lane] != 0) {
+            if self.occluded1(&ray_of_lane(packet, lane)) {
+                packet.tfar[lane] = f32::NEG_INFINITY;
+                mask |= 1 << lane;
+            }
+        }
+        mask
+    }
+}
+
+fn ray_of_lane<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {
+    Ray {
+        origin: [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]],
+        direction: [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]],
+        tnear: packet.tnear[lane],
+        tfar: packet.tfar[lane],
     }
 }

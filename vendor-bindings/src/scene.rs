@@ -35,6 +35,8 @@ struct Inner {
     // By id. Dropped after `Inner::drop` released the scene, so that buffers outlive their last user.
     geometries: BTreeMap<u32, Geometry>,
     largest_coordinate: f32,
+    // Widths of packets that are traversed as such; a sum, since all are powers of two.
+    native_widths: usize,
 }
 
 // SAFETY: a scene may be built on any thread, one at a time, which `&mut SceneBuilder` ensures; once
@@ -58,6 +60,7 @@ impl SceneBuilder {
             device: device.clone(),
             geometries: BTreeMap::new(),
             largest_coordinate: MAX_COORDINATE,
+            native_widths: [4, 8, 16].into_iter().filter(|width| device.native_packets(*width)).sum(),
         });
         builder.robust(true)
     }
@@ -166,6 +169,11 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn handle(&self) -> RTCScene {
         self.0.handle
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_native(&self, width: usize) -> bool {
+        self.0.native_widths & width != 0
     }
 
     pub(crate) fn has_instances(&self) -> bool {

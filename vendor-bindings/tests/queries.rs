@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Random, device, down, floor, library, scene_of};
+use common::{Random, device, devices, down, floor, library, scene_of};
 use embree_sys::{
     Device, Hit, Ray, Scene, SceneBuilder,
     packet::{INVALID_ID, RayHitPacket, RayPacket},
@@ -166,8 +166,9 @@ fn check_against_reference(device: &Device) {
 /// Random triangles against an independent computation in f64, single rays and all packets.
 #[test]
 fn all_forms_agree_with_an_f64_reference() {
-    let Some(device) = device() else { return };
-    check_against_reference(&device);
+    for device in devices() {
+        check_against_reference(&device);
+    }
 }
 
 /// On a processor without AVX, packets of 8 and 16 are not native; they must still be right.
@@ -184,22 +185,25 @@ fn packets_that_are_not_native_are_right() {
 #[test]
 fn inactive_lanes_are_untouched() {
     fn check<const N: usize>(scene: &Scene) {
-        for active in [0u32, 1, 0b0110, 0b1010 % (1 << N), 0xffff_0000] {
+        for (coherent, active) in [false, true].into_iter().flat_map(|coherent| {
+            [0u32, 1, 0b0110, 0b1010, 0xf00f, 0xffff_0000].map(|active| (coherent, active))
+        }) {
             let mut packet = RayHitPacket::<N>::empty();
             for lane in 0..N {
                 set(&mut packet.ray, lane, &down(0.3, 0.3));
                 packet.hit.prim_id[lane] = 77;
                 packet.hit.u[lane] = 0.123;
                 packet.hit.inst_prim_id[lane] = 55;
-                if active >> lane & 1 == 0 {
+                // Half of the inactive lanes hold a ray that would hit, the other half garbage.
+                if active >> lane & 1 == 0 && lane % 4 < 2 {
                     packet.ray.org_x[lane] = f32::NAN;
                     packet.ray.tfar[lane] = f32::from_bits(0x7fc0_1234);
                 }
             }
             let before = packet;
-            scene.intersect_packet(active, &mut packet, false);
+            scene.intersect_packet(active, &mut packet, coherent);
             let mut shadow = before.ray;
-            let mask = scene.occluded_packet(active, &mut shadow, false);
+            let mask = scene.occluded_packet(active, &mut shadow, coherent);
             assert_eq!(mask, active & ((1 << N) - 1), "exactly the active lanes are blocked");
             for lane in 0..N {
                 if active >> lane & 1 == 1 {
@@ -217,11 +221,12 @@ fn inactive_lanes_are_untouched() {
             }
         }
     }
-    let Some(device) = device() else { return };
-    let scene = scene_of(&device, floor(1), None);
-    check::<4>(&scene);
-    check::<8>(&scene);
-    check::<16>(&scene);
+    for device in devices() {
+        let scene = scene_of(&device, floor(1), None);
+        check::<4>(&scene);
+        check::<8>(&scene);
+        check::<16>(&scene);
+    }
 }
 
 /// An active lane with the interval [0, −∞] is empty: it must not pass for blocked, whose mark is tfar = −∞.
@@ -241,8 +246,12 @@ fn an_empty_interval_is_never_blocked() {
 /// Rays of NaN, infinity, zero and denormals end in some answer, and leave the lanes beside them right.
 #[test]
 fn garbage_rays_do_no_harm() {
-    let Some(device) = device() else { return };
-    let scene = scene_of(&device, floor(32), None);
+    for device in devices() {
+        hit_with_garbage(&scene_of(&device, floor(32), None));
+    }
+}
+
+fn hit_with_garbage(scene: &Scene) {
     let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e-42, 1e30, f32::MAX, -1.0];
     let mut random = Random(3);
     let good = down(10.3, 20.3);

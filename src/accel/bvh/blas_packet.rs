@@ -8,7 +8,7 @@ use super::node::{TriangleBlock, WIDTH};
 use super::packet::{Group, PacketRays};
 use super::traverse::{any_hit, nearest_hit};
 use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
-use super::triangle::{Distances, EdgeTest, test_edges};
+use super::triangle::{Distances, EdgeTest, LaneHit, test_edges};
 
 impl Blas {
     /// The lanes of a packet that are blocked.
@@ -22,6 +22,7 @@ impl Blas {
         let mut blocked = 0;
         let mut remaining = active & rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [0; STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -30,6 +31,7 @@ impl Blas {
                 (wide, narrow),
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit| match visit {
                     Visit::Leaf(leaf, lanes) => {
@@ -63,8 +65,10 @@ impl Blas {
         active: LaneMask,
         nearest: &mut [Nearest; W],
     ) {
+        let mut found = NearestLanes { u: [0.0; W], v: [0.0; W], ids: [u32::MAX; W] };
         let mut remaining = active & rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [(0, 0, 0.0); STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -73,14 +77,22 @@ impl Blas {
                 (wide, narrow),
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit, rays| match visit {
                     Visit::Leaf(leaf, lanes) => {
-                        self.leaf_nearest((wide, narrow), rays, &group, &self.blocks[leaf], lanes, nearest);
+                        self.leaf_nearest(
+                            (wide, narrow),
+                            rays,
+                            &group,
+                            &self.blocks[leaf],
+                            lanes,
+                            &mut found,
+                        );
                     }
                     Visit::Alone(start, lane) => {
                         let ray = rays.single(&group, lane);
-                        let best = &mut nearest[lane % W];
+                        let mut best = found.lane(lane, ray.t_far);
                         nearest_hit(
                             &self.tree,
                             narrow,
@@ -90,14 +102,17 @@ impl Blas {
                             ray.t_far,
                             #[inline(always)]
                             |leaf| {
-                                self.intersect_block(narrow, &self.blocks[leaf], &ray, best);
+                                self.intersect_block(narrow, &self.blocks[leaf], &ray, &mut best);
                                 best.hit.t
                             },
                         );
-                        rays.t_far[lane % W] = best.hit.t;
+                        found.set_lane(lane, &best, rays);
                     }
                 },
             );
+        }
+        for (lane, nearest) in nearest.iter_mut().enumerate() {
+            *nearest = found.lane(lane, rays.t_far[lane]);
         }
     }
 
@@ -159,7 +174,7 @@ impl Blas {
         group: &Group<W>,
         block: &TriangleBlock,
         lanes: LaneMask,
-        nearest: &mut [Nearest; W],
+        found: &mut NearestLanes<W>,
     ) {
         let used = block.used();
         if lanes.count_ones() <= used.count_ones() {
@@ -167,8 +182,9 @@ impl Blas {
             while left != 0 {
                 let lane = left.trailing_zeros() as usize % W;
                 left &= left - 1;
-                if self.intersect_block(narrow, block, &rays.single(group, lane), &mut nearest[lane]) {
-                    rays.t_far[lane] = nearest[lane].hit.t;
+                let mut best = found.lane(lane, rays.t_far[lane]);
+                if self.intersect_block(narrow, block, &rays.single(group, lane), &mut best) {
+                    found.set_lane(lane, &best, rays);
                 }
             }
             return;
@@ -180,6 +196,13 @@ impl Blas {
             let Some((edges, distances)) = test_triangle(wide, rays, group, block, triangle, lanes) else {
                 continue;
             };
+            let id = block.ids[triangle];
+            if distances.undecided == 0 && !self.has_cutouts {
+                if distances.hits != 0 {
+                    found.offer_all(&distances, id, rays);
+                }
+                continue;
+            }
             let mut hits = distances.hits | distances.undecided;
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % W;
@@ -189,14 +212,50 @@ impl Blas {
                 } else {
                     Some(distances.hit(lane))
                 };
-                let id = block.ids[triangle];
+                let mut best = found.lane(lane, rays.t_far[lane]);
                 if let Some(hit) = hit
                     && self.is_opaque(id, &hit)
-                    && nearest[lane].offer(hit, id)
+                    && best.offer(hit, id)
                 {
-                    rays.t_far[lane] = hit.t;
+                    found.set_lane(lane, &best, rays);
                 }
             }
+        }
+    }
+}
+
+/// Nearest hits of a packet, whose distances are the rays' `t_far`.
+struct NearestLanes<const W: usize> {
+    u: [f32; W],
+    v: [f32; W],
+    ids: [u32; W],
+}
+
+impl<const W: usize> NearestLanes<W> {
+    #[inline(always)]
+    fn lane(&self, lane: usize, t_far: f32) -> Nearest {
+        let lane = lane % W;
+        Nearest { hit: LaneHit { t: t_far, u: self.u[lane], v: self.v[lane] }, id: self.ids[lane] }
+    }
+
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, nearest: &Nearest, rays: &mut PacketRays<W>) {
+        let lane = lane % W;
+        rays.t_far[lane] = nearest.hit.t;
+        (self.u[lane], self.v[lane], self.ids[lane]) = (nearest.hit.u, nearest.hit.v, nearest.id);
+    }
+
+    /// [`Nearest::offer`] for all lanes that one triangle hits; without branches, so that it vectorises.
+    #[inline(always)]
+    fn offer_all(&mut self, distances: &Distances<W>, id: u32, rays: &mut PacketRays<W>) {
+        for lane in 0..W {
+            let hit = distances.hit(lane);
+            let nearer = (hit.t < rays.t_far[lane]) | ((hit.t == rays.t_far[lane]) & (id < self.ids[lane]));
+            let better = nearer & (distances.hits >> lane & 1 != 0);
+            rays.t_far[lane] = if better { hit.t } else { rays.t_far[lane] };
+            self.u[lane] = if better { hit.u } else { self.u[lane] };
+            self.v[lane] = if better { hit.v } else { self.v[lane] };
+            self.ids[lane] = if better { id } else { self.ids[lane] };
         }
     }
 }

@@ -106,6 +106,8 @@ impl BvhAccel {
         let (fixed, instances) = build_scene(scene)?;
         let needed = instances.trees.iter().chain([&fixed]).map(|blas| blas.tree.stack_bound).max();
         let needed = needed.unwrap_or(0).max(instances.tree.stack_bound);
+        // A small group of rays starts with an entry per ray.
+        let needed = needed + packet::GROUP_TEST as usize;
         if needed > top_level::STACK {
             return Err(BvhError::TooDeep { needed, limit: top_level::STACK });
         }

@@ -6,6 +6,9 @@ use super::lanes::{Lanes, map3};
 use super::node::{FAR_SCALE, Node, WIDTH};
 use super::ray::{SingleRay, largest_axis, safe_reciprocal};
 
+/// From this many rays on a node's children are tested one by one against the whole group.
+pub const GROUP_TEST: u32 = 6;
+
 /// `W` rays as a structure of arrays, prepared for traversal.
 #[derive(Clone)]
 pub struct PacketRays<const W: usize> {
@@ -38,6 +41,9 @@ pub struct Group<const W: usize> {
     pub signs: [usize; 3],
     pub axes: [usize; 3],
     pub shear: [[f32; W]; 3],
+    /// Ranges over the group's rays, axis by axis; unset for groups below [`GROUP_TEST`].
+    origins: [(f32, f32); 3],
+    reciprocals: [(f32, f32); 3],
 }
 
 impl<const W: usize> PacketRays<W> {
@@ -78,10 +84,10 @@ impl<const W: usize> PacketRays<W> {
         rays
     }
 
-    /// The group that lane `lane` belongs to, within `lanes`.
+    /// The group that lane `first` belongs to, within `lanes`.
     #[inline(always)]
-    pub fn group_of(&self, lane: usize, lanes: LaneMask) -> Group<W> {
-        let kind = self.kinds[lane % W];
+    pub fn group_of(&self, first: usize, lanes: LaneMask) -> Group<W> {
+        let kind = self.kinds[first % W];
         let mut mask = 0;
         for (lane, &other) in self.kinds.iter().enumerate() {
             mask |= u32::from(other == kind) << lane;
@@ -89,15 +95,41 @@ impl<const W: usize> PacketRays<W> {
         let kz = usize::from(kind >> 3) % 3;
         let kx = (kz + 1) % 3;
         let ky = (kz + 2) % 3;
-        let mut shear = [[0.0; W]; 3];
-        for lane in 0..W {
-            let dz = self.direction[kz][lane];
-            shear[0][lane] = self.direction[kx][lane] / dz;
-            shear[1][lane] = self.direction[ky][lane] / dz;
-            shear[2][lane] = 1.0 / dz;
-        }
+        let lanes = mask & lanes;
         let signs = [usize::from(kind & 1), usize::from(kind >> 1 & 1), usize::from(kind >> 2 & 1)];
-        Group { lanes: mask & lanes, signs, axes: [kx, ky, kz], shear }
+        let mut group = Group {
+            lanes,
+            signs,
+            axes: [kx, ky, kz],
+            shear: [[0.0; W]; 3],
+            origins: [(0.0, 0.0); 3],
+            reciprocals: [(0.0, 0.0); 3],
+        };
+        if lanes.count_ones() >= GROUP_TEST {
+            for lane in 0..W {
+                self.set_shear(&mut group, lane);
+            }
+            for axis in 0..3 {
+                group.origins[axis] = range(&self.origin[axis], first, lanes);
+                group.reciprocals[axis] = range(&self.reciprocal[axis], first, lanes);
+            }
+        } else {
+            let mut left = lanes;
+            while left != 0 {
+                self.set_shear(&mut group, left.trailing_zeros() as usize % W);
+                left &= left - 1;
+            }
+        }
+        group
+    }
+
+    #[inline(always)]
+    fn set_shear(&self, group: &mut Group<W>, lane: usize) {
+        let [kx, ky, kz] = group.axes;
+        let dz = self.direction[kz][lane];
+        group.shear[0][lane] = self.direction[kx][lane] / dz;
+        group.shear[1][lane] = self.direction[ky][lane] / dz;
+        group.shear[2][lane] = 1.0 / dz;
     }
 
     /// One lane of a group as a single ray.
@@ -114,6 +146,30 @@ impl<const W: usize> PacketRays<W> {
             t_near: self.t_near[lane],
             t_far: self.t_far[lane],
         }
+    }
+
+    /// The children of a node that any ray of the group may meet, by interval arithmetic: cheaper than
+    /// testing each ray, and never less.
+    #[inline(always)]
+    pub fn may_meet<S: Lanes<WIDTH>>(&self, simd: S, group: &Group<W>, node: &Node) -> u32 {
+        let (mut near, mut far) = (simd.splat(0.0), simd.splat(f32::MAX));
+        for axis in 0..3 {
+            let sign = group.signs[axis] & 1;
+            let (least_origin, most_origin) = group.origins[axis];
+            // From the origin that reaches the near planes first, and the far planes last.
+            let (early, late) =
+                if sign == 0 { (most_origin, least_origin) } else { (least_origin, most_origin) };
+            let (a, b) = group.reciprocals[axis];
+            let (a, b) = (simd.splat(a), simd.splat(b));
+            let enter = simd.sub(simd.load(&node.planes[2 * axis + sign]), simd.splat(early));
+            let leave = simd.sub(simd.load(&node.planes[2 * axis + (sign ^ 1)]), simd.splat(late));
+            let (enter_a, enter_b) = (simd.mul(enter, a), simd.mul(enter, b));
+            let (leave_a, leave_b) = (simd.mul(leave, a), simd.mul(leave, b));
+            // A NaN, from an overflow, must not cull: it is the first operand and drops out.
+            near = simd.max(simd.min(enter_a, simd.min(enter_b, simd.splat(f32::MAX))), near);
+            far = simd.min(simd.max(leave_a, simd.max(leave_b, simd.splat(-f32::MAX))), far);
+        }
+        simd.le(near, simd.mul(far, simd.splat(FAR_SCALE))) & node.used
     }
 
     /// Where the rays meet one plane of a child.
@@ -145,6 +201,39 @@ impl<const W: usize> PacketRays<W> {
         );
         (simd.le(near, simd.mul(far, simd.splat(FAR_SCALE))), near)
     }
+}
+
+/// Least and greatest value of some lanes, of which `first` is one.
+#[inline(always)]
+fn range<const W: usize>(values: &[f32; W], first: usize, lanes: LaneMask) -> (f32, f32) {
+    let mut members = *values;
+    for (lane, member) in members.iter_mut().enumerate() {
+        *member = if lanes >> lane & 1 != 0 { *member } else { values[first % W] };
+    }
+    (least(members), -least(negated(members)))
+}
+
+/// The least value; NaN doesn't count unless all are.
+#[inline(always)]
+pub fn least<const W: usize>(mut values: [f32; W]) -> f32 {
+    // Halving rather than one after the other, which vectorises.
+    let mut width = W;
+    while width > 1 {
+        width /= 2;
+        for lane in 0..width {
+            let (a, b) = (values[lane], values[lane + width]);
+            values[lane] = if a < b { a } else { b };
+        }
+    }
+    values[0]
+}
+
+#[inline(always)]
+fn negated<const W: usize>(mut values: [f32; W]) -> [f32; W] {
+    for value in &mut values {
+        *value = -*value;
+    }
+    values
 }
 
 #[inline(always)]

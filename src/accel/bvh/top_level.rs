@@ -90,7 +90,7 @@ impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketNeare
 
 impl BvhAccel {
     #[inline(always)]
-    pub fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
+    pub(super) fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
         let single = SingleRay::new(ray)?;
         let nearest = self.fixed.intersect::<S, STACK>(simd, &single);
         let mut best = None;
@@ -135,7 +135,7 @@ impl BvhAccel {
     }
 
     #[inline(always)]
-    pub fn occluded_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> bool {
+    pub(super) fn occluded_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> bool {
         let Some(single) = SingleRay::new(ray) else { return false };
         if self.fixed.occluded::<S, STACK>(simd, &single) {
             return true;
@@ -161,7 +161,7 @@ impl BvhAccel {
     }
 
     #[inline(always)]
-    pub fn occluded_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
+    pub(super) fn occluded_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
         &self,
         simd: (K, S),
         rays: &PacketRays<W>,
@@ -184,11 +184,13 @@ impl BvhAccel {
                 found
             };
             let mut stack = [0; STACK];
+            let mut group_stack = [0; STACK];
             blocked |= any_hit_packet::<K, S, W, STACK>(
                 &self.instances.tree,
                 simd,
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit| match visit {
                     Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes),
@@ -206,7 +208,7 @@ impl BvhAccel {
     }
 
     #[inline(always)]
-    pub fn intersect_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
+    pub(super) fn intersect_lanes<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
         &self,
         simd: (K, S),
         rays: &mut PacketRays<W>,
@@ -222,6 +224,7 @@ impl BvhAccel {
         }
         let mut remaining = rays.active;
         let mut stack = [0; STACK];
+        let mut group_stack = [(0, 0, 0.0); STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
@@ -244,6 +247,7 @@ impl BvhAccel {
                 simd,
                 rays,
                 &group,
+                &mut group_stack,
                 #[inline(always)]
                 |visit, rays| match visit {
                     Visit::Leaf(leaf, lanes) => visit_leaf(leaf, lanes, rays),

@@ -2,16 +2,16 @@
 //!
 //! A node is tested in the way that is cheaper for the number of rays that reach it: while many do, all
 //! rays against one child after the other; when few are left, one ray after the other against
-//! all children; a last ray goes on alone.
+//! all children; the last few go on alone.
 
 use crate::accel::LaneMask;
 
 use super::lanes::Lanes;
 use super::node::{FAR_SCALE, LEAF, WIDTH, WideTree};
-use super::packet::{Group, PacketRays};
+use super::packet::{GROUP_TEST, Group, PacketRays, least};
 
-/// From this many rays on a node's children are tested one by one against the whole group.
-const GROUP_TEST: u32 = 5;
+/// Up to this many rays walk on one by one.
+const ALONE: u32 = 3;
 
 /// What a walk with several rays leaves to its caller.
 pub enum Visit {
@@ -28,15 +28,18 @@ pub fn any_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK:
     (wide, narrow): (K, S),
     rays: &PacketRays<W>,
     group: &Group<W>,
+    stack: &mut [u64; STACK],
     mut visit: impl FnMut(Visit) -> LaneMask,
 ) -> LaneMask {
     let mut alive = group.lanes;
     if tree.nodes.is_empty() {
         return 0;
     }
-    let mut stack = [0u64; STACK];
-    let mut size = 1;
-    stack[0] = u64::from(alive) << 32;
+    let mut size = 0;
+    for_each_start(group, |lanes| {
+        stack[size] = u64::from(lanes) << 32;
+        size += 1;
+    });
     while size > 0 {
         size -= 1;
         let entry = stack[size];
@@ -45,14 +48,18 @@ pub fn any_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK:
         if lanes == 0 {
             continue;
         }
-        if lanes & (lanes - 1) == 0 {
-            alive &= !visit(Visit::Alone(current, lanes.trailing_zeros() as usize));
+        if lanes.count_ones() <= ALONE {
+            let mut left = lanes;
+            while left != 0 {
+                alive &= !visit(Visit::Alone(current, left.trailing_zeros() as usize));
+                left &= left - 1;
+            }
         } else if current & LEAF != 0 {
             alive &= !visit(Visit::Leaf((current & !LEAF) as usize, lanes));
         } else {
             let node = &tree.nodes[current as usize];
             if lanes.count_ones() >= GROUP_TEST {
-                let mut used = node.used;
+                let mut used = rays.may_meet(narrow, group, node);
                 while used != 0 {
                     let slot = used.trailing_zeros() as usize % WIDTH;
                     used &= used - 1;
@@ -99,14 +106,17 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
     (wide, narrow): (K, S),
     rays: &mut PacketRays<W>,
     group: &Group<W>,
+    stack: &mut [(u32, LaneMask, f32); STACK],
     mut visit: impl FnMut(Visit, &mut PacketRays<W>),
 ) {
     if tree.nodes.is_empty() || group.lanes == 0 {
         return;
     }
-    let mut stack = [(0u32, 0u32, 0.0f32); STACK];
-    let mut size = 1;
-    stack[0] = (0, group.lanes, 0.0);
+    let mut size = 0;
+    for_each_start(group, |lanes| {
+        stack[size] = (0, lanes, 0.0);
+        size += 1;
+    });
     while size > 0 {
         size -= 1;
         let (current, lanes, near) = stack[size];
@@ -116,8 +126,12 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
         if lanes == 0 {
             continue;
         }
-        if lanes & (lanes - 1) == 0 {
-            visit(Visit::Alone(current, lanes.trailing_zeros() as usize), rays);
+        if lanes.count_ones() <= ALONE {
+            let mut left = lanes;
+            while left != 0 {
+                visit(Visit::Alone(current, left.trailing_zeros() as usize), rays);
+                left &= left - 1;
+            }
             continue;
         }
         if current & LEAF != 0 {
@@ -130,7 +144,7 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
         // Where the first of the rays enters each child: orders and later culls.
         let mut nearest = [0.0f32; WIDTH];
         if lanes.count_ones() >= GROUP_TEST {
-            let mut used = node.used;
+            let mut used = rays.may_meet(narrow, group, node);
             while used != 0 {
                 let slot = used.trailing_zeros() as usize % WIDTH;
                 used &= used - 1;
@@ -174,12 +188,15 @@ pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const ST
     }
 }
 
-/// The least value; NaN doesn't count.
+/// Calls `start` with the lanes that begin at the root together: all of a large group, each of a small one.
 #[inline(always)]
-fn least<const W: usize>(values: [f32; W]) -> f32 {
-    let mut least = f32::INFINITY;
-    for value in values {
-        least = if value < least { value } else { least };
+fn for_each_start<const W: usize>(group: &Group<W>, mut start: impl FnMut(LaneMask)) {
+    if group.lanes.count_ones() >= GROUP_TEST {
+        return start(group.lanes);
     }
-    least
+    let mut left = group.lanes;
+    while left != 0 {
+        start(left & left.wrapping_neg());
+        left &= left - 1;
+    }
 }

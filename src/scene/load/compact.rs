@@ -16,10 +16,8 @@ pub fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     if number.iter().all(|&number| number != UNUSED) {
         return;
     }
-    let mut next = 0;
-    for number in number.iter_mut().filter(|number| **number != UNUSED) {
+    for (next, number) in (0..).zip(number.iter_mut().filter(|number| **number != UNUSED)) {
         *number = next;
-        next += 1;
     }
     fn kept<T: Copy>(list: &[T], number: &[u32]) -> Vec<T> {
         list.iter().zip(number).filter(|(_, number)| **number != UNUSED).map(|(&value, _)| value).collect()

@@ -3,6 +3,7 @@
 //! Whatever the format, a model file becomes a [`Model`]; the scene file places models and adds what
 //! they lack.
 
+mod bare;
 mod compact;
 mod cutout;
 mod error;
@@ -23,6 +24,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+pub use bare::{OpenedScene, auto_exposure, complete, open_scene};
 pub use error::{LoadError, Skipped, Warning};
 pub use parts::{MaterialOverride, Selector};
 pub use points::load_points;

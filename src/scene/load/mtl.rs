@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::obj::text::{Lines, decode, parse_f32, tokens};
+use super::obj::text::{Lines, decode, parse_f32, split_word, tokens};
 use super::{LoadError, Warning};
 use crate::scene::Material;
 
@@ -13,8 +13,23 @@ use crate::scene::Material;
 pub struct MtlFile {
     /// The materials; the first of several of the same name is the one that counts.
     pub materials: Vec<Material>,
+    /// Pictures and coverage of each of the materials.
+    pub maps: Vec<MtlMaps>,
     /// What was found and done.
     pub warnings: Vec<Warning>,
+}
+
+/// The pictures that a material names, and how opaque it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MtlMaps {
+    /// `map_Kd`.
+    pub diffuse: Option<String>,
+    /// `map_Ke`.
+    pub emission: Option<String>,
+    /// `map_d`.
+    pub coverage: Option<String>,
+    /// `d`, or 1 − `Tr`; 1 is opaque.
+    pub alpha: Option<f32>,
 }
 
 /// Reads an MTL file's text: `Kd`, `Ks` and `Ke` become k_d, k_s and Emiss.
@@ -30,14 +45,12 @@ pub fn parse_mtl(text: &[u8], path: &Path) -> Result<MtlFile, LoadError> {
     let mut current: Option<Open> = None;
     for (line, content) in Lines::new(text) {
         let fail = |problem: String| LoadError::Line { file: path.to_owned(), line, problem };
-        let content = content.trim_ascii();
-        let end = content.iter().position(u8::is_ascii_whitespace).unwrap_or(content.len());
-        let (keyword, rest) = content.split_at(end);
+        let (keyword, rest) = split_word(content);
         if keyword == b"newmtl" {
             file.close(current.take(), path);
             let name = decode(rest.trim_ascii());
             let material = Material { name, ..Material::default() };
-            current = Some(Open { material, illum: None, line });
+            current = Some(Open { material, maps: MtlMaps::default(), illum: None, line });
             continue;
         }
         let Some(open) = &mut current else { continue };
@@ -45,6 +58,14 @@ pub fn parse_mtl(text: &[u8], path: &Path) -> Result<MtlFile, LoadError> {
             b"Kd" => open.material.diffuse = color(rest, open.material.diffuse).map_err(fail)?,
             b"Ks" => open.material.specular = color(rest, open.material.specular).map_err(fail)?,
             b"Ke" => open.material.emission = color(rest, open.material.emission).map_err(fail)?,
+            b"map_Kd" => open.maps.diffuse = picture_name(rest),
+            b"map_Ke" => open.maps.emission = picture_name(rest),
+            b"map_d" => open.maps.coverage = picture_name(rest),
+            b"d" => open.maps.alpha = tokens(rest).next().and_then(parse_f32),
+            // Where both are given, d counts: programs disagree about Tr.
+            b"Tr" if open.maps.alpha.is_none() => {
+                open.maps.alpha = tokens(rest).next().and_then(parse_f32).map(|tr| 1.0 - tr);
+            }
             b"illum" => open.illum = tokens(rest).next().and_then(parse_f32),
             _ => {}
         }
@@ -56,13 +77,14 @@ pub fn parse_mtl(text: &[u8], path: &Path) -> Result<MtlFile, LoadError> {
 /// A material whose statements are still being read.
 struct Open {
     material: Material,
+    maps: MtlMaps,
     illum: Option<f32>,
     line: usize,
 }
 
 impl MtlFile {
     fn close(&mut self, open: Option<Open>, path: &Path) {
-        let Some(Open { mut material, illum, line }) = open else { return };
+        let Some(Open { mut material, maps, illum, line }) = open else { return };
         let mut warn = |message: String| {
             self.warnings.push(Warning { file: path.to_owned(), line: Some(line), message });
         };
@@ -75,7 +97,46 @@ impl MtlFile {
             warn(format!("material '{}' reflects more light than it receives", material.name));
         }
         self.materials.push(material);
+        self.maps.push(maps);
     }
+}
+
+/// Options of a picture statement, with the number of words that each takes; of the first three, all but one may be
+/// left out.
+const PICTURE_OPTIONS: [(&[u8], usize); 13] = [
+    (b"-o", 3),
+    (b"-s", 3),
+    (b"-t", 3),
+    (b"-mm", 2),
+    (b"-bm", 1),
+    (b"-blendu", 1),
+    (b"-blendv", 1),
+    (b"-boost", 1),
+    (b"-cc", 1),
+    (b"-clamp", 1),
+    (b"-imfchan", 1),
+    (b"-texres", 1),
+    (b"-type", 1),
+];
+
+/// The file name behind a picture statement's options; it may hold spaces.
+fn picture_name(rest: &[u8]) -> Option<String> {
+    let mut rest = rest.trim_ascii();
+    while rest.first() == Some(&b'-') {
+        let split = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+        let (option, mut after) = rest.split_at(split(rest));
+        let Some((_, count)) = PICTURE_OPTIONS.iter().find(|(name, _)| *name == option) else { break };
+        after = after.trim_ascii_start();
+        for taken in 0..*count {
+            let (word, behind) = after.split_at(split(after));
+            if taken > 0 && *count == 3 && parse_f32(word).is_none() {
+                break;
+            }
+            after = behind.trim_ascii_start();
+        }
+        rest = after;
+    }
+    (!rest.is_empty()).then(|| decode(rest))
 }
 
 /// One number for grey or three for RGB. `spectral` and `xyz` forms keep the value before.

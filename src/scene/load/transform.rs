@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, DMat3, Mat3A, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{CutOut, Positions, TriangleMesh};
+use crate::scene::{Camera, CutOut, LightShape, PointLight, Positions, TriangleMesh};
 
 /// Whether directions survive a linear map.
 pub fn is_invertible(linear: &Mat3A) -> bool {
@@ -33,6 +33,29 @@ pub fn move_mesh(mesh: &mut TriangleMesh, to_world: &Affine3A) {
             .cutout
             .take()
             .map(|opaque| -> CutOut { Arc::new(move |triangle, u, v| opaque(triangle, v, u)) });
+    }
+}
+
+/// A light in another place; its intensity is that of the file whatever the scale.
+pub fn moved_light(light: &PointLight, to_world: &Affine3A) -> PointLight {
+    let turned = |direction: Vec3| to_world.transform_vector3(direction).normalize_or(direction);
+    let shape = match light.shape {
+        LightShape::Point => LightShape::Point,
+        LightShape::Spot { direction, inner_cosine, outer_cosine } => {
+            LightShape::Spot { direction: turned(direction), inner_cosine, outer_cosine }
+        }
+        LightShape::Directional { direction } => LightShape::Directional { direction: turned(direction) },
+    };
+    PointLight { position: to_world.transform_point3(light.position), shape, ..*light }
+}
+
+/// A camera in another place.
+pub fn moved_camera(camera: &Camera, to_world: &Affine3A) -> Camera {
+    Camera {
+        position: to_world.transform_point3(camera.position),
+        look_at: to_world.transform_point3(camera.look_at),
+        up: to_world.transform_vector3(camera.up).normalize_or(camera.up),
+        ..camera.clone()
     }
 }
 

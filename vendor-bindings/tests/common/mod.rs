@@ -36,6 +36,23 @@ pub fn device() -> Option<Device> {
     Some(Device::new(&library()?, "").unwrap())
 }
 
+/// Devices for every instruction set that Embree has code for and this processor runs; none where the test is
+/// skipped. Each set has traversals of its own, and packets that are wider than it are taken apart.
+pub fn devices() -> Vec<Device> {
+    let Some(library) = library() else { return Vec::new() };
+    let mut configurations = vec!["", "isa=sse2", "isa=sse4.2"];
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx") {
+            configurations.push("isa=avx");
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            configurations.push("isa=avx2");
+        }
+    }
+    configurations.into_iter().map(|configuration| Device::new(&library, configuration).unwrap()).collect()
+}
+
 /// The square [0, n]² at z = 0 in unit cells of two triangles, 2·(y·n + x) and the one after it.
 pub fn floor(n: u32) -> Buffers {
     let mut vertices: Vec<[f32; 3]> =

@@ -82,6 +82,10 @@ impl<'a> Document<'a> {
         // Some writers don't encode, and a name may hold a literal %.
         let candidates: [PathBuf; 2] = [folder.join(&*decoded), folder.join(uri)];
         let file = candidates.iter().find(|file| file.exists()).unwrap_or(&candidates[0]);
+        if file.exists() && !file.is_file() {
+            // A device would never end.
+            return Err(self.error(place, format!("{} is not a regular file", file.display())));
+        }
         source::read_all(file).map_err(|error| match error {
             LoadError::Read { file, source } => {
                 let reason = source.to_string();

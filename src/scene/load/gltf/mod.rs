@@ -145,10 +145,7 @@ impl Placer<'_> {
 
     /// Whether the mesh stays within what the backends can take.
     fn fits(&self, mesh: &TriangleMesh, to_world: &glam::Affine3A) -> bool {
-        let mut bounds = crate::scene::Bounds::EMPTY;
-        for &p in mesh.positions.as_slice() {
-            bounds.extend(p.into());
-        }
+        let bounds = mesh.bounds();
         (0..8).all(|corner| {
             let choose = |axis: usize| {
                 if corner >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] }

@@ -192,7 +192,7 @@ impl MeshBuilder {
             }
             _ => {
                 indices.chunks_exact(3).for_each(|corners| push([corners[0], corners[1], corners[2]]));
-                self.skipped.short_faces += u64::from(indices.len() % 3 != 0);
+                self.skipped.short_faces += u64::from(!indices.len().is_multiple_of(3));
             }
         }
         Ok(())

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::chunk::NameKind;
 use super::materials::MaterialTable;
 use super::statements::{ABSENT, Statements};
+use crate::scene::load::cutout::cut_out;
 use crate::scene::load::triangulate::{Triangulator, has_no_area};
 use crate::scene::load::{LoadError, Model, Part, Warning};
 use crate::scene::{Instance, Positions, TriangleMaterials, TriangleMesh};
@@ -50,8 +51,9 @@ pub fn assemble(
         return Err(LoadError::Empty { file: path.to_owned(), skipped });
     }
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let mesh = builder.finish(name);
-    let (materials, more) = table.into_used();
+    let mut mesh = builder.finish(name);
+    let (materials, masks, more) = table.into_used();
+    cut_out(&mut mesh, &masks);
     warnings.extend(more);
     let instances = vec![Instance { mesh: 0, to_world: None }];
     Ok(Model { meshes: vec![mesh], instances, materials, parts, skipped, warnings, ..Model::default() })

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::text::{Lines, decode, parse_f32, tokens};
+use super::text::{Lines, decode, parse_f32, split_word, tokens};
 use crate::scene::load::Skipped;
 
 /// A corner without a texture coordinate or normal.
@@ -135,9 +135,7 @@ impl Chunk {
 
     #[inline]
     fn statement(&mut self, line: usize, content: &[u8]) -> Result<(), String> {
-        let content = content.trim_ascii_start();
-        let end = content.iter().position(u8::is_ascii_whitespace).unwrap_or(content.len());
-        let (keyword, rest) = content.split_at(end);
+        let (keyword, rest) = split_word(content);
         match keyword {
             b"v" => self.position(rest),
             b"f" | b"fo" => self.face(line, rest),

@@ -4,21 +4,35 @@ use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{Affine2, Vec2};
 
 use super::chunk::{NameKind, NameStatement};
-use crate::scene::Material;
-use crate::scene::load::mtl::parse_mtl;
-use crate::scene::load::{LoadError, Warning};
+use crate::scene::load::cutout::AlphaMask;
+use crate::scene::load::mtl::{MtlMaps, parse_mtl};
+use crate::scene::load::{LoadError, Warning, pictures, source};
+use crate::scene::{Material, Texture, TextureMap, Wrap};
 
 /// Words of an `mtllib` statement that are tried as one name with spaces.
 const LONGEST_NAME: usize = 16;
 
+/// A material of an MTL file whose pictures are not read yet.
+#[derive(Clone)]
+struct Known {
+    material: Material,
+    maps: MtlMaps,
+    library: PathBuf,
+}
+
 /// Materials by name, and those in use.
 #[derive(Default)]
 pub struct MaterialTable {
-    known: HashMap<String, Material>,
+    known: HashMap<String, Known>,
     index: HashMap<String, u32>,
     used: Vec<Material>,
+    masks: Vec<Option<AlphaMask>>,
+    pictures: HashMap<PathBuf, Option<Arc<Texture>>>,
     /// What was found and done.
     pub warnings: Vec<Warning>,
 }
@@ -55,10 +69,56 @@ impl MaterialTable {
         let text = fs::read(path).map_err(|source| LoadError::Read { file: path.to_owned(), source })?;
         let file = parse_mtl(&text, path)?;
         self.warnings.extend(file.warnings);
-        for material in file.materials {
-            self.known.entry(material.name.clone()).or_insert(material);
+        for (material, maps) in file.materials.into_iter().zip(file.maps) {
+            let library = path.to_owned();
+            self.known.entry(material.name.clone()).or_insert(Known { material, maps, library });
         }
         Ok(())
+    }
+
+    /// A material with its pictures, which are read only for materials in use.
+    fn complete(&mut self, known: Known) -> (Material, Option<AlphaMask>) {
+        let Known { mut material, maps, library } = known;
+        let mut read = |name: &Option<String>| self.picture(name.as_deref()?, &library);
+        let (diffuse, emission, coverage) = (read(&maps.diffuse), read(&maps.emission), read(&maps.coverage));
+        let map = |texture: Arc<Texture>| {
+            // The files count from the lower left corner of the picture.
+            let transform = Affine2::from_translation(Vec2::Y) * Affine2::from_scale(Vec2::new(1.0, -1.0));
+            TextureMap { texture, transform, wrap: [Wrap::Repeat; 2] }
+        };
+        material.diffuse_map = diffuse.clone().map(map);
+        material.emission_map = emission.map(map);
+        let coverage = match (coverage, diffuse) {
+            (Some(coverage), _) => Some(Arc::new(coverage.with_coverage(&coverage))),
+            // A picture's own transparency cuts out too, as programs show it.
+            (None, diffuse) => diffuse,
+        };
+        let mask = AlphaMask { map: coverage.map(map), alpha: maps.alpha.unwrap_or(1.0), cutoff: 0.5 };
+        let mask = (!mask.is_solid()).then_some(mask);
+        (material, mask)
+    }
+
+    /// A picture beside an MTL file; `None` with a warning where it can't be read.
+    fn picture(&mut self, name: &str, library: &Path) -> Option<Arc<Texture>> {
+        let folder = library.parent().unwrap_or(Path::new(""));
+        let found = existing(name, folder).unwrap_or_else(|| folder.join(name));
+        if let Some(known) = self.pictures.get(&found) {
+            return known.clone();
+        }
+        let bytes = if found.is_file() { source::read_all(&found).ok() } else { None };
+        let picture = bytes
+            .ok_or_else(|| "not found or not readable".to_owned())
+            .and_then(|bytes| pictures::decode(&bytes));
+        let picture = match picture {
+            Ok(picture) => Some(Arc::new(picture)),
+            Err(why) => {
+                let message = format!("picture '{}' is left out: {why}", name.escape_debug());
+                self.warnings.push(Warning { file: library.to_owned(), line: None, message });
+                None
+            }
+        };
+        self.pictures.insert(found, picture.clone());
+        picture
     }
 
     /// Index of a material for triangles; a name that no MTL file defines gets the default material,
@@ -68,25 +128,26 @@ impl MaterialTable {
             return index;
         }
         let index = self.used.len() as u32;
-        let material = match self.known.get(name) {
-            Some(material) => material.clone(),
+        let (material, mask) = match self.known.get(name).cloned() {
+            Some(known) => self.complete(known),
             None => {
                 if !name.is_empty() {
                     let message = format!("material '{name}' is not defined, the default is used");
                     let line = Some(line as usize);
                     self.warnings.push(Warning { file: obj.to_owned(), line, message });
                 }
-                Material { name: name.to_owned(), ..Material::default() }
+                (Material { name: name.to_owned(), ..Material::default() }, None)
             }
         };
         self.used.push(material);
+        self.masks.push(mask);
         self.index.insert(name.to_owned(), index);
         index
     }
 
-    /// The materials that were asked for, in the order of their indices, and the warnings.
-    pub fn into_used(self) -> (Vec<Material>, Vec<Warning>) {
-        (self.used, self.warnings)
+    /// The materials that were asked for, in the order of their indices, where they are transparent, and the warnings.
+    pub fn into_used(self) -> (Vec<Material>, Vec<Option<AlphaMask>>, Vec<Warning>) {
+        (self.used, self.masks, self.warnings)
     }
 }
 

@@ -36,9 +36,41 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// The first word of a line and what follows it; the word is empty at the line's end.
+#[inline]
+pub fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
+    let line = line.trim_ascii_start();
+    let mut end = 0;
+    while end < line.len() && !line[end].is_ascii_whitespace() {
+        end += 1;
+    }
+    line.split_at(end)
+}
+
 /// The words of a line up to a comment: a `#` at the start of a word.
-pub fn tokens(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take_while(|word| word[0] != b'#')
+#[inline]
+pub fn tokens(line: &[u8]) -> Tokens<'_> {
+    Tokens { rest: line }
+}
+
+/// The words of a line; see [`tokens`].
+pub struct Tokens<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Iterator for Tokens<'a> {
+    type Item = &'a [u8];
+
+    #[inline]
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let (word, rest) = split_word(self.rest);
+        self.rest = rest;
+        if matches!(word.first(), None | Some(b'#')) {
+            self.rest = &[];
+            return None;
+        }
+        Some(word)
+    }
 }
 
 /// A number in full, in the forms that C's `strtod` reads.

@@ -24,6 +24,14 @@ pub struct GeometryTable {
     rotate: Option<Rotation>,
     scale: Option<ScaleFactors>,
     matrix: Option<Spanned<[[Finite; 4]; 3]>>,
+    #[serde(default = "yes")]
+    lights: bool,
+    #[serde(default = "yes")]
+    cameras: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// `[[material]]`
@@ -121,11 +129,23 @@ pub fn load(
         let canonical = readable.and_then(|()| fs::canonicalize(&path));
         let canonical =
             canonical.map_err(|error| places.unreadable(&file.span(), &key, path.clone(), error))?;
-        if let Some((_, placements)) = models.get_mut(&canonical) {
+        if let Some((model, placements)) = models.get_mut(&canonical) {
             placements.push(to_world);
+            if !table.get_ref().lights {
+                model.lights.clear();
+            }
+            if !table.get_ref().cameras {
+                model.cameras.clear();
+            }
             continue;
         }
-        let model = load_model(&path)?;
+        let mut model = load_model(&path)?;
+        if !table.get_ref().lights {
+            model.lights.clear();
+        }
+        if !table.get_ref().cameras {
+            model.cameras.clear();
+        }
         order.push(canonical.clone());
         models.insert(canonical, (model, vec![to_world]));
     }
@@ -182,6 +202,12 @@ impl Gathered {
                 TriangleMaterials::PerTriangle(list) => list.iter_mut().for_each(|m| *m += first_material),
             }
         }
+        for placement in placements {
+            let to_world = placement.unwrap_or(Affine3A::IDENTITY);
+            scene.lights.extend(model.lights.iter().map(|light| transform::moved_light(light, &to_world)));
+            let cameras = model.cameras.iter().map(|camera| transform::moved_camera(camera, &to_world));
+            self.cameras.extend(cameras);
+        }
         // Geometry that stands in one place only is moved there, which spares rays the way through an instance.
         let mut placements = placements.to_vec();
         if let ([Some(to_world)], true) =
@@ -204,8 +230,6 @@ impl Gathered {
             }
         }
         scene.meshes.extend(meshes.into_iter().map(Arc::<TriangleMesh>::new));
-        scene.lights.extend(model.lights);
-        self.cameras.extend(model.cameras);
         self.skipped.add(&model.skipped);
         self.warnings.extend(model.warnings);
     }

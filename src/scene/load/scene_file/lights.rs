@@ -5,10 +5,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
-use super::values::{Color, Count, Fraction, NonNegative, Point};
+use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point};
 use crate::scene::load::LoadError;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Falloff, PointLight};
+use crate::scene::{Falloff, LightShape, PointLight};
 
 /// Lights that one table may lay out.
 const MAX_LIGHTS: u32 = 1_000_000;
@@ -17,7 +17,9 @@ const MAX_LIGHTS: u32 = 1_000_000;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightTable {
-    position: Point,
+    position: Option<Point>,
+    direction: Option<Direction>,
+    cone: Option<[Finite; 2]>,
     intensity: Color,
 }
 
@@ -75,9 +77,30 @@ pub fn falloff(
 }
 
 impl LightTable {
-    /// The light.
-    pub fn light(&self) -> PointLight {
-        PointLight::new(self.position.0, self.intensity.0)
+    /// The light: a position makes a point light, a direction a directional one, both together a spot.
+    pub fn light(table: &Spanned<Self>, index: usize, places: &Places) -> Result<PointLight, LoadError> {
+        let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
+        let Self { position, direction, cone, intensity } = table.get_ref();
+        let direction = direction.map(|direction| direction.0.as_dvec3().normalize().as_vec3());
+        if cone.is_some() && (position.is_none() || direction.is_none()) {
+            return error("cone needs position and direction");
+        }
+        let [inner, outer] = cone.map_or([0.0, 45.0], |cone| cone.map(|angle| angle.0));
+        let shape = match direction {
+            _ if !(0.0 <= inner && inner <= outer && outer <= 90.0) => {
+                return error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90");
+            }
+            None if position.is_none() => return error("needs a position or a direction"),
+            None => LightShape::Point,
+            Some(direction) if position.is_some() => LightShape::Spot {
+                direction,
+                inner_cosine: inner.to_radians().cos(),
+                outer_cosine: outer.to_radians().cos(),
+            },
+            Some(direction) => LightShape::Directional { direction },
+        };
+        let position = position.map_or(Vec3::ZERO, |position| position.0);
+        Ok(PointLight { position, intensity: intensity.0, shape })
     }
 }
 

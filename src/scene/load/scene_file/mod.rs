@@ -51,7 +51,7 @@ struct SceneTable {
     preset: Option<PresetName>,
     falloff: Option<FalloffName>,
     falloff_constant: Option<Spanned<NonNegative>>,
-    camera: Spanned<CameraTable>,
+    camera: Option<Spanned<CameraTable>>,
     #[serde(default)]
     render: RenderTable,
     #[serde(default)]
@@ -60,7 +60,7 @@ struct SceneTable {
     #[serde(default)]
     material: Vec<Spanned<MaterialTable>>,
     #[serde(default)]
-    light: Vec<LightTable>,
+    light: Vec<Spanned<LightTable>>,
     #[serde(default)]
     light_box: Vec<Spanned<LightBoxTable>>,
     #[serde(default)]
@@ -109,14 +109,18 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
     table.light_mesh.apply(&mut settings.light_mesh, folder, &places)?;
 
     let mut gathered = Gathered::default();
-    gathered.cameras.push(CameraTable::camera(&table.camera, &places)?);
+    if let Some(camera) = &table.camera {
+        gathered.cameras.push(CameraTable::camera(camera, &places)?);
+    }
     let constant = table.falloff_constant.as_ref().map(|constant| *constant.get_ref());
     gathered.scene.falloff = lights::falloff(falloff, table.falloff, constant).ok_or_else(|| {
         let span = table.falloff_constant.as_ref().map(Spanned::span).unwrap_or_default();
         places.error(&span, "falloff_constant", "needs falloff = \"linear\"")
     })?;
     gathered.scene.background = table.background.map_or(glam::Vec3::ZERO, |color| color.0);
-    gathered.scene.lights.extend(table.light.iter().map(LightTable::light));
+    for (index, light) in table.light.iter().enumerate() {
+        gathered.scene.lights.push(LightTable::light(light, index, &places)?);
+    }
     for (index, light_box) in table.light_box.iter().enumerate() {
         gathered.scene.lights.extend(LightBoxTable::lights(light_box, index, &places)?);
     }
@@ -126,6 +130,9 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
 
     geometry::load(&table.geometry, &table.material, folder, &places, &mut gathered)?;
     gathered.ensure_material();
+    if gathered.cameras.is_empty() {
+        return Err(places.error(&(0..0), "camera", "is missing, and no model has one"));
+    }
     let Gathered { scene, cameras, skipped, warnings } = gathered;
     Ok(LoadedScene { scene, cameras, settings, skipped, warnings })
 }

@@ -23,6 +23,7 @@ pub struct RenderTable {
     max_depth: Option<Count<1_000>>,
     weight_threshold: Option<Fraction>,
     exposure: Option<Stops>,
+    lambertian: Option<bool>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -83,6 +84,7 @@ impl RenderTable {
         settings.max_depth = self.max_depth.map_or(settings.max_depth, |count| count.0);
         settings.weight_threshold =
             self.weight_threshold.map_or(settings.weight_threshold, |weight| weight.0);
+        settings.lambertian = self.lambertian.unwrap_or(settings.lambertian);
         settings.exposure = self.exposure.map_or(settings.exposure, |stops| stops.0);
         Ok(())
     }

@@ -1,0 +1,172 @@
+//! `lightmesh init`: a scene file for a model, with all that was chosen written down.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::accel::{Backend, BackendChoice, BackendError};
+use crate::image::{ImageError, OutputFile};
+use crate::render::render;
+use crate::scene::load::{LoadError, ModelFormat, OpenedScene, auto_exposure, complete, load_model};
+use crate::scene::{Camera, LightShape, PointLight};
+use crate::settings::{Integrator, Settings, Spacing};
+
+/// What `init` takes.
+#[derive(Args, Debug)]
+pub struct InitArgs {
+    /// Model (.glb, .gltf, .obj, .ply)
+    pub model: PathBuf,
+    /// Scene file to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+/// Why nothing was written.
+#[derive(Debug, thiserror::Error)]
+pub enum InitError {
+    /// The model can't be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The scene file can't be written.
+    #[error(transparent)]
+    Write(#[from] ImageError),
+    /// No backend.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// The model is a scene file already.
+    #[error("{}: is not a model (known: .glb, .gltf, .obj, .ply)", .0.display())]
+    NoModel(PathBuf),
+    /// The names can't be put into TOML.
+    #[error("{}: the name is not UTF-8", .0.display())]
+    Name(PathBuf),
+}
+
+/// Size of the picture that the exposure is taken from.
+const PREVIEW: (u32, u32) = (96, 72);
+
+/// Writes the scene file.
+///
+/// # Errors
+/// See [`InitError`]; then no file has changed.
+pub fn run(args: &InitArgs) -> Result<(), InitError> {
+    if ModelFormat::of(&args.model).is_none() {
+        return Err(InitError::NoModel(args.model.clone()));
+    }
+    let target = OutputFile::new(&args.output)?;
+    let model = load_model(&args.model)?;
+    let (has_lights, has_cameras) = (!model.lights.is_empty(), !model.cameras.is_empty());
+    let opened = complete(model);
+    let exposure = exposure(&opened)?;
+    let folder = args.output.parent().unwrap_or(Path::new(""));
+    let file = relative(&args.model, folder);
+    let file = file.to_str().ok_or_else(|| InitError::Name(args.model.clone()))?;
+    let text = scene_file(&opened, file, exposure, has_lights, has_cameras);
+    Ok(target.write(text.as_bytes())?)
+}
+
+/// Exposure by a small picture.
+fn exposure(opened: &OpenedScene) -> Result<f32, InitError> {
+    let loaded = &opened.loaded;
+    let backend = Backend::build(BackendChoice::Auto, &loaded.scene)?.backend;
+    let settings =
+        Settings { resolution: PREVIEW, integrator: Integrator::Conventional, ..loaded.settings.clone() };
+    let Some(camera) = loaded.cameras.first() else { return Ok(0.0) };
+    let film = render(&backend, &loaded.scene, camera, &settings, &());
+    Ok(film.map_or(0.0, |(film, _)| auto_exposure(&film.pixels)))
+}
+
+/// The model as the scene file has to name it.
+fn relative(model: &Path, folder: &Path) -> PathBuf {
+    if let Ok(inside) = model.strip_prefix(folder) {
+        return inside.to_owned();
+    }
+    std::path::absolute(model).unwrap_or_else(|_| model.to_owned())
+}
+
+/// A text as TOML has it.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+fn scene_file(
+    opened: &OpenedScene,
+    file: &str,
+    exposure: f32,
+    has_lights: bool,
+    has_cameras: bool,
+) -> String {
+    let loaded = &opened.loaded;
+    let mut text = String::new();
+    let mut line = |content: String| {
+        // Writing to a String can't fail.
+        let _ = writeln!(text, "{content}");
+    };
+    line("# Lights in candela (W/sr) at point lights, in lux at directional ones.".to_owned());
+    line("falloff = \"inverse-square\"".to_owned());
+    if let Some(camera) = loaded.cameras.first() {
+        line(String::new());
+        if has_cameras {
+            line("# The model's first camera; without this table it is taken from the model.".to_owned());
+            let names: Vec<&str> = loaded.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            line(format!("# Cameras in the model, for --camera: {}", quoted(&names.join(", "))));
+        } else {
+            line("# The model has no camera: this one frames it.".to_owned());
+        }
+        line(camera_table(camera));
+    }
+    let (width, height) = loaded.settings.resolution;
+    line("\n[render]".to_owned());
+    line(format!("resolution = [{width}, {height}]"));
+    line("lambertian = true".to_owned());
+    line("# Stops; each doubles the brightness of PNG pictures.".to_owned());
+    line(format!("exposure = {exposure:?}"));
+    line("\n[light_mesh]".to_owned());
+    if let Spacing::Units(spacing) = loaded.settings.light_mesh.points.spacing {
+        line("# Distance between mesh points, from the model's size and its lights.".to_owned());
+        line(format!("spacing = {:?}", spacing.x));
+    }
+    line("radius_in_spacings = 2.0".to_owned());
+    line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
+    line("resolve = \"trace\"".to_owned());
+    line("\n# Indirect light: remove the # to have it.\n# [light_mesh.indirect]".to_owned());
+    line("\n[[geometry]]".to_owned());
+    line(format!("file = {}", quoted(file)));
+    if has_lights {
+        line(format!("# false leaves out the model's {} lights.\nlights = true", loaded.scene.lights.len()));
+    } else {
+        line("\n# The model has no lights: these follow the camera.".to_owned());
+        loaded.scene.lights.iter().for_each(|light| line(light_table(light)));
+    }
+    text
+}
+
+fn camera_table(camera: &Camera) -> String {
+    let Camera { name, position, look_at, up, vertical_fov } = camera;
+    format!(
+        "[camera]\nname = {}\nposition = {:?}\nlook_at = {:?}\nup = {:?}\nvertical_fov = {vertical_fov:?}",
+        quoted(name),
+        position.to_array(),
+        look_at.to_array(),
+        up.to_array(),
+    )
+}
+
+fn light_table(light: &PointLight) -> String {
+    let mut table = "[[light]]\n".to_owned();
+    let direction = match light.shape {
+        LightShape::Point => None,
+        LightShape::Spot { direction, .. } | LightShape::Directional { direction } => Some(direction),
+    };
+    if !matches!(light.shape, LightShape::Directional { .. }) {
+        table += &format!("position = {:?}\n", light.position.to_array());
+    }
+    if let Some(direction) = direction {
+        table += &format!("direction = {:?}\n", direction.to_array());
+    }
+    if let LightShape::Spot { inner_cosine, outer_cosine, .. } = light.shape {
+        let angles = [inner_cosine, outer_cosine].map(|cosine| cosine.acos().to_degrees());
+        table += &format!("cone = {angles:?}\n");
+    }
+    table + &format!("intensity = {:?}", light.intensity.to_array())
+}
