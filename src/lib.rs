@@ -1,5 +1,7 @@
 //! Renderer for large triangle scenes with many lights, by Debelov and Sevastyanov's light meshes.
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 pub mod accel;
 pub mod bench;
 pub mod cli;

@@ -44,6 +44,9 @@ impl Progress for () {
 }
 
 /// Light meshes of a scene; they keep their values from one render to the next.
+///
+/// Known values are never changed. With several bounces of indirect light, points that a later view adds build on the
+/// final values of those that are there, so that views agree with first renders to within the tolerance, not to the bit.
 pub struct LightMeshes {
     direct: DirectMesh,
     indirect: Option<IndirectMesh>,
