@@ -412,7 +412,7 @@ fn placements(random: &mut Random) -> Vec<Affine3A> {
         .map(|i| {
             let mut linear = Mat3::from_cols(random.vec(), random.vec(), random.vec()) + Mat3::IDENTITY;
             if i % 3 == 0 {
-                linear = linear * Mat3::from_diagonal(Vec3::new(-1.0, 1.0, 1.0));
+                linear *= Mat3::from_diagonal(Vec3::new(-1.0, 1.0, 1.0));
             }
             Affine3A::from_mat3_translation(0.4 * linear, random.vec())
         })

@@ -112,7 +112,8 @@ fn the_penumbra_of_an_edge_has_its_analytic_profile() {
     assert!(penumbra > SIDE * SIDE / 2, "most of the picture is penumbra");
 }
 
-/// With R fixed, the light mesh's own error falls with every finer spacing.
+/// With R fixed, the light mesh's own error falls with every finer spacing, at the least by half over two
+/// halvings: more points make a better mean.
 #[test]
 fn light_meshes_converge_to_the_reference() {
     let reference = picture(&settings(Integrator::Reference, Neighbourhood::SmoothSphere, 0.5));
@@ -122,7 +123,7 @@ fn light_meshes_converge_to_the_reference() {
         (squares.sum::<f32>() / film.pixels.len() as f32).sqrt()
     });
     assert!(errors[0] > errors[1] && errors[1] > errors[2], "{errors:?}");
-    assert!(errors[2] < 0.02, "{errors:?}");
+    assert!(errors[2] < 0.5 * errors[0], "{errors:?}");
 }
 
 /// At infinite density the nearest mesh point is the surface point itself: hard shadows.

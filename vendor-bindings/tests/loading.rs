@@ -20,7 +20,7 @@ fn a_known_version_is_loaded() {
 #[test]
 fn a_library_that_cannot_be_loaded_is_named() {
     let name = "/nowhere/libembree4.so";
-    let error = Library::open(OsStr::new(name)).err().expect("there is no such file");
+    let Err(error) = Library::open(OsStr::new(name)) else { panic!("there is no such file") };
     assert!(matches!(&error, Error::CannotLoad { name: n, .. } if n == name), "{error:?}");
     assert!(error.to_string().contains(name), "{error}");
     assert!(error.to_string().contains("No such file"), "{error}");
@@ -29,7 +29,7 @@ fn a_library_that_cannot_be_loaded_is_named() {
 /// A library that is not Embree is refused by the function that it lacks.
 #[test]
 fn a_library_that_is_not_embree_is_refused() {
-    let error = Library::open(OsStr::new("libc.so.6")).err().expect("the C library is not Embree");
+    let Err(error) = Library::open(OsStr::new("libc.so.6")) else { panic!("the C library is not Embree") };
     assert!(matches!(error, Error::NotEmbree { .. }), "{error:?}");
     assert!(error.to_string().contains("rtcNewDevice"), "{error}");
 }
