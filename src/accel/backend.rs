@@ -91,7 +91,7 @@ impl Backend {
                 // A library that the user named has to work.
                 Err(EmbreeError::Library(cause)) if std::env::var_os("EMBREE_LIB").is_none() => {
                     let notice = format!(
-                        "{cause}; using the built-in BVH, which is slower. To use Embree, install the package \
+                        "{cause}; using the built-in BVH. To use Embree, install the package \
                          libembree3-3 (Debian 12) or libembree4-4 (Debian 13)"
                     );
                     Ok(Chosen { backend: Self::Bvh(Box::new(BvhAccel::build(scene)?)), notice: Some(notice) })
@@ -102,7 +102,7 @@ impl Backend {
             BackendChoice::Embree => Err(BackendError::NoEmbreeSupport),
             #[cfg(not(feature = "embree"))]
             BackendChoice::Auto => {
-                let notice = "this build has no Embree support; using the slower built-in BVH".to_owned();
+                let notice = "this build has no Embree support; using the built-in BVH".to_owned();
                 Ok(Chosen { backend: Self::Bvh(Box::new(BvhAccel::build(scene)?)), notice: Some(notice) })
             }
         }

@@ -18,7 +18,7 @@ use crate::image::{ImageError, OutputFile};
 /// all pictures of the list that are there.
 #[derive(Args, Clone, Debug)]
 pub struct GalleryArgs {
-    /// The list: a TOML file of [[picture]] tables with name, title, scene and caption
+    /// The list: a TOML file of `[[picture]]` tables with name, title, scene and caption
     #[arg(long, value_name = "FILE", default_value = "scenes/gallery.toml")]
     pub list: PathBuf,
     /// Folder to write into, created if need be

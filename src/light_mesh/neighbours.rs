@@ -104,7 +104,7 @@ impl Neighbours {
         self.push_row(|_| id, &[weight]);
     }
 
-    /// Adds those of up to [`ROW`] points whose weight is above 0; `id(i)` names point i.
+    /// Adds those of up to `ROW` (8) points whose weight is above 0; `id(i)` names point i.
     ///
     /// All are written and the end moves past those that count: in a ball's rows a branch would be a coin toss.
     #[inline(always)]
