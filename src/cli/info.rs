@@ -60,8 +60,7 @@ struct Memory {
     bvh: u64,
 }
 
-/// Bytes that Embree's robust trees of medium quality take per triangle, and per instance; measured on scenes of
-/// 10⁵ to 10⁷ triangles.
+/// Estimates of the bytes that Embree's robust trees of medium quality take per triangle, and per instance.
 const EMBREE_BYTES: (u64, u64) = (110, 700);
 /// The same for the built-in BVH.
 const BVH_BYTES: (u64, u64) = (90, 260);
