@@ -129,14 +129,42 @@ pub struct IndirectSettings {
     pub points: PointSettings,
     /// N, the number of directions traced from each mesh point, at least 1.
     pub directions: u32,
+    /// Occlusion rays from each mesh point to points on surfaces that shine, so that small lamps don't come out as noise; 0
+    /// leaves them to the directions alone, as in the paper.
+    pub emitter_samples: u32,
     /// Times that light is passed on between surfaces, at least 1; 1 is the paper's.
     pub bounces: u32,
     /// Further bounces end when no value changes by more than this share of the mesh's largest value.
     pub tolerance: f32,
+    /// Extrapolate the field to the surface, along its normal, instead of taking the mean over D_y, which is the field a few
+    /// tenths of R in front of it.
+    pub at_surface: bool,
     /// What is kept per mesh point.
     pub form: IndirectForm,
     /// Scale of the stored values.
     pub normalization: Normalization,
+}
+
+impl IndirectSettings {
+    /// Indirect light varies slowly: unless told otherwise, spacing and radius are this many times the direct mesh's.
+    pub const COARSENESS: f32 = 3.0;
+
+    /// Points for indirect light, given those for direct light.
+    pub fn coarser(points: &PointSettings) -> PointSettings {
+        let mut points = points.clone();
+        let spacing = |spacing: Vec3| spacing * Self::COARSENESS;
+        if let Spacing::Units(units) = points.spacing {
+            points.spacing = Spacing::Units(spacing(units));
+        }
+        if let Radius::Units(radius) = points.radius {
+            points.radius = Radius::Units(radius * Self::COARSENESS);
+        }
+        for region in &mut points.regions {
+            region.spacing = region.spacing.map(spacing);
+            region.radius = region.radius.map(|radius| radius * Self::COARSENESS);
+        }
+        points
+    }
 }
 
 impl Default for IndirectSettings {
@@ -144,8 +172,10 @@ impl Default for IndirectSettings {
         Self {
             points: PointSettings::default(),
             directions: 256,
+            emitter_samples: 32,
             bounces: 1,
             tolerance: 1e-3,
+            at_surface: false,
             form: IndirectForm::Directional,
             normalization: Normalization::Mean,
         }

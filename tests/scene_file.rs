@@ -271,6 +271,8 @@ max = [1, 1, 1]
 spacing = 0.5
 [light_mesh.indirect]
 directions = 64
+emitter_samples = 0
+at_surface = true
 bounces = 2
 tolerance = 0.125
 form = \"scalar\"
@@ -295,6 +297,7 @@ layout = \"body-centred\"
     assert_eq!(mesh.points.regions.len(), 1);
     assert_eq!(mesh.points.regions[0].spacing, Some(Vec3::splat(0.5)));
     let indirect = mesh.indirect.expect("its table is there");
+    assert_eq!((indirect.emitter_samples, indirect.at_surface), (0, true));
     assert_eq!((indirect.directions, indirect.bounces, indirect.tolerance), (64, 2, 0.125));
     assert_eq!((indirect.form, indirect.normalization), (IndirectForm::Scalar, Normalization::Integral));
     assert_eq!(indirect.points.layout, PointLayout::BodyCentred);

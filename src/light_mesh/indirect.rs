@@ -4,17 +4,20 @@
 //! is Emiss + k_d·I from the direct light mesh, plus k_d·Ĩ_d from this mesh's previous iteration where there are
 //! several bounces. Points that such hits need are evaluated the same lazy way, until nothing is missing.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::directional::{self, COEFFICIENTS};
+use super::emitters::Emitters;
 use super::estimator::{DirectMesh, Scratch};
 use super::leaks::{amounts_differ, is_inside_by_share};
 use super::neighbours::Neighbours;
-use super::points::{MeshError, MeshPoints};
-use super::sphere::SphereStrata;
+use super::normal_table::{self, NormalSums, NormalWeights};
+use super::points::{AUTO_SPACINGS, MeshError, MeshPoints};
+use super::sphere::{SphereStrata, noise};
 use super::store::{NeededPoints, PointMask};
-use crate::accel::{Accel, Coherence, Hit, PacketLanes, Ray, RayHitPacket, hit_of_lane};
+use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
 use crate::scene::{Scene, SurfacePoint};
 use crate::settings::{IndirectForm, IndirectSettings, Leaks, Normalization};
 
@@ -33,10 +36,9 @@ pub struct IndirectMesh {
     pub points: MeshPoints,
     strata: SphereStrata,
     settings: IndirectSettings,
-    /// IndirectLight by slot, [`IndirectMesh::stride`] numbers each, as means over directions.
-    values: Vec<f32>,
-    /// Mean light from all around by slot, summed over the channels.
-    amounts: Vec<f32>,
+    emitters: Emitters,
+    /// IndirectLight by slot, [`IndirectMesh::entries`] each, as means over directions; the first is that of all light.
+    values: Vec<[f32; 3]>,
     /// Points inside of geometry, by slot.
     inside: Vec<bool>,
 }
@@ -55,20 +57,28 @@ impl IndirectMesh {
     /// Mesh over a scene, with no point known.
     pub fn new(scene: &Scene, settings: &IndirectSettings) -> Result<Self, MeshError> {
         Ok(Self {
-            points: MeshPoints::new(scene.bounds(), &settings.points)?,
+            points: MeshPoints::with_auto_spacing(
+                scene.bounds(),
+                &settings.points,
+                AUTO_SPACINGS / IndirectSettings::COARSENESS,
+            )?,
             strata: SphereStrata::new(settings.directions),
+            emitters: if settings.emitter_samples > 0 {
+                Emitters::of_scene(scene)
+            } else {
+                Emitters::default()
+            },
             settings: settings.clone(),
             values: Vec::new(),
-            amounts: Vec::new(),
             inside: Vec::new(),
         })
     }
 
-    /// Numbers per mesh point.
-    fn stride(&self) -> usize {
+    /// RGB values per mesh point.
+    fn entries(&self) -> usize {
         match self.settings.form {
-            IndirectForm::Scalar => 3,
-            IndirectForm::Directional => directional::STRIDE,
+            IndirectForm::Scalar => 1,
+            IndirectForm::Directional => normal_table::ENTRIES,
         }
     }
 
@@ -98,7 +108,7 @@ impl IndirectMesh {
                 let inside: Vec<bool> = seen
                     .map(|(&x, hits)| {
                         let mut backs = 0;
-                        self.for_each_hit(scene, x, hits, |_, surface| {
+                        self.for_each_hit(scene, x, hits, |_, _, surface| {
                             backs += usize::from(surface.is_some_and(|surface| surface.shows_back()));
                         });
                         is_inside_by_share(backs, hits.len())
@@ -148,18 +158,18 @@ impl IndirectMesh {
         hits
     }
 
-    /// Calls `each(direction, surface)` for a mesh point's directions; `None` where a ray left the scene.
+    /// Calls `each(cell, direction, surface)` for a mesh point's directions; `None` where a ray left the scene.
     #[inline(always)]
     fn for_each_hit(
         &self,
         scene: &Scene,
         x: Vec3,
         hits: &[Option<Hit>],
-        mut each: impl FnMut(Vec3, Option<SurfacePoint>),
+        mut each: impl FnMut(usize, Vec3, Option<SurfacePoint>),
     ) {
         for (cell, hit) in hits.iter().enumerate() {
             let direction = self.strata.jittered(cell as u32, x);
-            each(direction, hit.as_ref().map(|hit| scene.surface_point(hit, direction)));
+            each(cell, direction, hit.as_ref().map(|hit| scene.surface_point(hit, direction)));
         }
     }
 
@@ -179,7 +189,7 @@ impl IndirectMesh {
                 let mut needed = NeededPoints::default();
                 let mut neighbours = Neighbours::default();
                 for (&x, hits) in points.iter().zip(hits.chunks(directions)) {
-                    self.for_each_hit(scene, x, hits, |_, surface| {
+                    self.for_each_hit(scene, x, hits, |_, _, surface| {
                         if let Some(surface) = surface {
                             mesh.neighbours(&surface, &mut neighbours);
                             neighbours.ids().iter().for_each(|&id| needed.insert(id));
@@ -193,7 +203,7 @@ impl IndirectMesh {
     }
 
     /// Eq. (4) for new points: one bounce, then as many more as asked for or until nothing changes any more.
-    /// Returns the number of occlusion rays that it took to keep light from leaking.
+    /// Returns the number of occlusion rays that it took to see emitters and to keep light from leaking.
     fn solve<A: Accel>(
         &mut self,
         accel: &A,
@@ -203,27 +213,46 @@ impl IndirectMesh {
         gathering: &Gathering,
     ) -> u64 {
         let first = self.values.len();
-        let (one_bounce, mut rays) = self.sweep(scene, gathering, scene.background, |surface, scratch| {
-            let illumination = direct.illumination(accel, surface, scratch) * direct_scale;
-            surface.emission + surface.diffuse * illumination
+        let (one_bounce, mut rays) = self.sweep(gathering, |x, hits, _, sums, scratch| {
+            self.for_each_hit(scene, x, hits, |cell, direction, surface| {
+                let light = surface.map_or(scene.background, |surface| {
+                    let illumination = direct.illumination(accel, &surface, scratch) * direct_scale;
+                    let share = match &hits[cell] {
+                        Some(hit) if surface.emission != Vec3::ZERO => {
+                            self.share_of_directions(self.emitters.density(scene, x, hit, &surface))
+                        }
+                        _ => 1.0,
+                    };
+                    surface.emission * share + surface.diffuse * illumination
+                });
+                self.accumulate(sums, direction, light);
+            });
+            scratch.rays += self.add_emitters(accel, scene, x, sums);
         });
         self.values.extend_from_slice(&one_bounce);
-        self.amounts.resize(first / self.stride() + gathering.points.len(), 0.0);
-        self.measure(gathering.points.len());
-        let peak = |values: &[f32]| values.iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
+        let peak =
+            |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
+        // What a hit sees of its D_y is the same for all bounces; it is asked once.
+        let mut visible = vec![0; if self.settings.bounces > 1 { gathering.hits.len() } else { 0 }];
         for _ in 1..self.settings.bounces {
-            let (mut next, more) = self.sweep(scene, gathering, Vec3::ZERO, |surface, scratch| {
-                surface.diffuse * self.illumination(accel, surface, scratch)
-            });
+            let (mut next, more) =
+                self.sweep_with(gathering, &mut visible, |x, hits, visible, sums, scratch| {
+                    self.for_each_hit(scene, x, hits, |cell, direction, surface| {
+                        if let Some(surface) = surface {
+                            let received = self.received(accel, &surface, scratch, Some(&mut visible[cell]));
+                            self.accumulate(sums, direction, surface.diffuse * received);
+                        }
+                    });
+                });
             rays += more;
-            next.iter_mut().zip(&one_bounce).for_each(|(value, first)| *value += first);
-            let change = next
+            let flat = next.as_flattened_mut();
+            flat.iter_mut().zip(one_bounce.as_flattened()).for_each(|(value, first)| *value += first);
+            let change = flat
                 .iter()
-                .zip(&self.values[first..])
+                .zip(self.values[first..].as_flattened())
                 .fold(0.0f32, |change, (next, value)| change.max((next - value).abs()));
             let done = change <= self.settings.tolerance * peak(&next);
             self.values[first..].copy_from_slice(&next);
-            self.measure(gathering.points.len());
             if done {
                 break;
             }
@@ -231,36 +260,80 @@ impl IndirectMesh {
         rays
     }
 
-    /// Mean over the directions of the radiance that surfaces send back, or of `background` where there is none.
+    /// Share of the directions of eq. (4) in all rays that could find a point on an emitter, the other ones being chosen
+    /// with a density of `density` each.
+    #[inline(always)]
+    fn share_of_directions(&self, density: f32) -> f32 {
+        let ours = self.strata.len() as f32 / (4.0 * PI);
+        ours / (ours + self.settings.emitter_samples as f32 * density)
+    }
+
+    /// Adds the light of emitters that the mesh point at `x` looks to; returns the number of rays.
+    #[inline(always)]
+    fn add_emitters<A: Accel>(&self, accel: &A, scene: &Scene, x: Vec3, sums: &mut NormalSums) -> u64 {
+        if self.emitters.is_empty() {
+            return 0;
+        }
+        const WIDTH: u32 = 16;
+        let count = self.settings.emitter_samples;
+        let noise = noise(x);
+        let mut rays = 0;
+        for first in (0..count).step_by(WIDTH as usize) {
+            let mut packet = RayPacket::<{ WIDTH as usize }>::empty();
+            let mut active: LaneMask = 0;
+            let mut found = [(Vec3::ZERO, Vec3::ZERO); WIDTH as usize];
+            for (lane, k) in (first..count.min(first + WIDTH)).enumerate() {
+                if let Some(sample) = self.emitters.sample(scene, x, k, count, noise) {
+                    packet.set_lane(lane, &Ray::between(x, sample.surface.ray_origin()));
+                    active |= 1 << lane;
+                    let light = sample.surface.emission * self.share_of_directions(sample.density);
+                    found[lane] = (sample.direction, light);
+                }
+            }
+            rays += u64::from(active.count_ones());
+            let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
+            for (lane, &(direction, light)) in found.iter().enumerate() {
+                if (active & !blocked) >> lane & 1 == 1 {
+                    self.accumulate(sums, direction, light);
+                }
+            }
+        }
+        rays
+    }
+
+    /// Calls `gather(x, hits, _, sums, scratch)` for all points and returns the values that the sums make, and the rays
+    /// that scratch counted.
     fn sweep(
         &self,
-        scene: &Scene,
         gathering: &Gathering,
-        background: Vec3,
-        radiance: impl Fn(&SurfacePoint, &mut Scratch) -> Vec3 + Sync,
-    ) -> (Vec<f32>, u64) {
-        let stride = self.stride();
+        gather: impl Fn(Vec3, &[Option<Hit>], &mut [u64], &mut NormalSums, &mut Scratch) + Sync,
+    ) -> (Vec<[f32; 3]>, u64) {
+        self.sweep_with(gathering, &mut [], gather)
+    }
+
+    /// The same with a number for each hit, or with none at all.
+    fn sweep_with(
+        &self,
+        gathering: &Gathering,
+        numbers: &mut [u64],
+        gather: impl Fn(Vec3, &[Option<Hit>], &mut [u64], &mut NormalSums, &mut Scratch) + Sync,
+    ) -> (Vec<[f32; 3]>, u64) {
+        let entries = self.entries();
         let directions = self.strata.len() as usize;
-        let mut values = vec![0.0f32; gathering.points.len() * stride];
+        let mut values = vec![[0.0f32; 3]; gathering.points.len() * entries];
+        let mut parts: Vec<&mut [u64]> = numbers.chunks_mut(directions).collect();
+        parts.resize_with(gathering.points.len(), || &mut []);
         let rays = values
-            .par_chunks_mut(stride)
+            .par_chunks_mut(entries)
             .zip(gathering.hits.par_chunks(directions))
+            .zip(parts.into_par_iter())
             .zip(&gathering.points)
-            .map(|((value, hits), &x)| {
+            .map_init(NormalSums::default, |sums, (((values, hits), numbers), &x)| {
                 pulp::Arch::new().dispatch(|| {
+                    sums.clear();
                     let mut scratch = Scratch::default();
-                    let mut sums = [0.0f32; directional::STRIDE];
-                    self.for_each_hit(scene, x, hits, |direction, surface| {
-                        let light = match &surface {
-                            Some(surface) => radiance(surface, &mut scratch),
-                            None => background,
-                        };
-                        self.accumulate(&mut sums, direction, light);
-                    });
-                    let scale = 1.0 / directions as f32;
-                    for (value, sum) in value.iter_mut().zip(&sums) {
-                        *value = sum * scale;
-                    }
+                    gather(x, hits, numbers, sums, &mut scratch);
+                    sums.write_means(directions as f32, values);
                     scratch.rays
                 })
             })
@@ -268,76 +341,71 @@ impl IndirectMesh {
         (values, rays)
     }
 
-    /// Brings the amounts of the last `count` points up to date.
-    fn measure(&mut self, count: usize) {
-        let first = self.amounts.len() - count;
-        for slot in first..self.amounts.len() {
-            let value = self.value(slot as u32);
-            self.amounts[slot] = match self.settings.form {
-                IndirectForm::Scalar => value.iter().sum(),
-                IndirectForm::Directional => directional::amount(value),
-            };
-        }
-    }
-
-    /// Adds light from one direction to a point's numbers.
+    /// Adds light from one direction to a point's sums.
     #[inline(always)]
-    fn accumulate(&self, sums: &mut [f32; directional::STRIDE], direction: Vec3, light: Vec3) {
-        match self.settings.form {
-            IndirectForm::Scalar => {
-                for (sum, light) in sums.iter_mut().zip(light.to_array()) {
-                    *sum += light;
-                }
-            }
-            IndirectForm::Directional => {
-                // Irradiance over π is (1/π)∫ L cos dω; as a mean over the sphere that is 4 · mean of L·cos.
-                let lobe = directional::cosine_lobe(direction.to_array());
-                for (channel, light) in light.to_array().into_iter().enumerate() {
-                    for (sum, coefficient) in sums[channel * COEFFICIENTS..].iter_mut().zip(lobe) {
-                        *sum += 4.0 * light * coefficient;
-                    }
-                }
-            }
-        }
+    fn accumulate(&self, sums: &mut NormalSums, direction: Vec3, light: Vec3) {
+        sums.add(direction, light, self.settings.form == IndirectForm::Directional);
     }
 
     /// Ĩ_d of eq. (5) at a surface point, all of whose D_y must be known; with the mean normalization it is the
     /// radiance that an all-white surface would send back.
     #[inline(always)]
     pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
-        let mut sums = [0.0f32; directional::STRIDE];
-        let total = scratch.points.total_weight();
-        for (slot, weight) in scratch.points.iter() {
-            for (sum, value) in sums.iter_mut().zip(self.value(slot)) {
-                *sum += weight * value;
+        self.received(accel, surface, scratch, None)
+    }
+
+    /// The same; `visible` remembers which points of D_y the surface point sees.
+    #[inline(always)]
+    fn received<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut Scratch,
+        visible: Option<&mut u64>,
+    ) -> Vec3 {
+        scratch.find(accel, &self.points, surface, &self.inside, visible, |slots| self.disagree(slots));
+        let points = &mut scratch.points;
+        if self.settings.at_surface {
+            let (y, normal) = (surface.position, surface.geometric_normal);
+            points.extrapolate_to_surface(|id| normal.dot(self.points.position(id) - y));
+        }
+        let points = &*points;
+        let mut sum = Vec3::ZERO;
+        match self.settings.form {
+            IndirectForm::Scalar => {
+                for (slot, weight) in points.iter() {
+                    sum += Vec3::from_array(self.value(slot)[0]) * weight;
+                }
+            }
+            IndirectForm::Directional => {
+                let by_normal = NormalWeights::of(surface.shading_normal);
+                for (slot, weight) in points.iter() {
+                    sum += by_normal.apply(self.value(slot)) * weight;
+                }
             }
         }
-        let mean = match self.settings.form {
-            IndirectForm::Scalar => Vec3::new(sums[0], sums[1], sums[2]),
-            IndirectForm::Directional => directional::irradiance(&sums, surface.shading_normal),
-        };
         let scale = match self.settings.normalization {
-            Normalization::Mean => 1.0 / total,
-            Normalization::Integral => 4.0 * std::f32::consts::PI / total,
+            Normalization::Mean => 1.0 / points.total_weight(),
+            Normalization::Integral => 4.0 * PI / points.total_weight(),
         };
-        mean * scale
+        // The mean and far points may enter with weights below 0, so that a single lamp may leave a trace of darkness behind it.
+        sum.max(Vec3::ZERO) * scale
     }
 
     #[inline(always)]
-    fn value(&self, slot: u32) -> &[f32] {
-        let stride = self.stride();
-        &self.values[slot as usize * stride..][..stride]
+    fn value(&self, slot: u32) -> &[[f32; 3]] {
+        let entries = self.entries();
+        &self.values[slot as usize * entries..][..entries]
     }
 
     /// Whether the points see so different amounts of light that a wall may stand between them.
     #[inline(always)]
     fn disagree(&self, slots: &[u32]) -> bool {
-        amounts_differ(slots.iter().map(|&slot| self.amounts[slot as usize]))
+        amounts_differ(slots.iter().map(|&slot| self.value(slot)[0].iter().sum()))
     }
 
     /// Bytes held by slots and values.
     pub fn memory_bytes(&self) -> usize {
-        self.points.memory_bytes() + self.values.capacity() * size_of::<f32>()
+        self.points.memory_bytes() + self.values.capacity() * size_of::<[f32; 3]>()
     }
 }

@@ -2,12 +2,14 @@
 
 mod direct;
 pub mod directional;
+mod emitters;
 mod estimator;
 mod indirect;
 mod lattice;
 mod leaks;
 mod lights;
 mod neighbours;
+mod normal_table;
 mod points;
 mod scattered;
 mod sphere;
@@ -19,7 +21,7 @@ pub use estimator::{DirectMesh, Scratch};
 pub use indirect::{IndirectMesh, IndirectRays};
 pub use lattice::Lattice;
 pub use leaks::is_inside;
-pub use lights::{LANES, LightTable, VisibilityBits, expand_bits};
+pub use lights::{LANES, Lanes, LightChunk, LightTable, VisibilityBits, expand_bits};
 pub use neighbours::{Ball, Neighbours};
 pub use points::{MeshError, MeshPoints, PointCounters};
 pub use sphere::SphereStrata;

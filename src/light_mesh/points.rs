@@ -71,8 +71,8 @@ pub struct MeshPoints {
     pub counters: PointCounters,
 }
 
-/// With `spacing = "auto"` the scene's diagonal is this many spacings long.
-const AUTO_SPACINGS: f32 = 120.0;
+/// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
+pub const AUTO_SPACINGS: f32 = 120.0;
 
 impl Layer {
     fn new(
@@ -99,11 +99,20 @@ impl Layer {
 impl MeshPoints {
     /// The points that `settings` ask for over a scene of the given bounds, all unknown.
     pub fn new(bounds: Bounds, settings: &PointSettings) -> Result<Self, MeshError> {
+        Self::with_auto_spacing(bounds, settings, AUTO_SPACINGS)
+    }
+
+    /// The same; an automatic spacing is the scene's diagonal over `auto_spacings`.
+    pub fn with_auto_spacing(
+        bounds: Bounds,
+        settings: &PointSettings,
+        auto_spacings: f32,
+    ) -> Result<Self, MeshError> {
         let spacing = match settings.spacing {
             Spacing::Units(spacing) => spacing,
             Spacing::Auto => {
                 let diagonal = bounds.extent().length();
-                Vec3::splat(if diagonal > 0.0 { diagonal / AUTO_SPACINGS } else { 1.0 })
+                Vec3::splat(if diagonal > 0.0 { diagonal / auto_spacings } else { 1.0 })
             }
         };
         let radius_for = |spacing: Vec3| match settings.radius {

@@ -75,6 +75,15 @@ impl SphereStrata {
     }
 }
 
+/// Three numbers of [0, 1) that belong to a mesh point.
+pub fn noise(x: Vec3) -> Vec3 {
+    let bits = x.to_array().map(f32::to_bits);
+    let mut h = mix(u64::from(bits[0]) | u64::from(bits[1]) << 32);
+    h = mix(h ^ u64::from(bits[2]));
+    let part = |shift: u32| (h >> shift & 0x1f_ffff) as f32 / (1u32 << 21) as f32;
+    Vec3::new(part(0), part(21), part(42))
+}
+
 /// Finaliser of SplitMix64.
 #[inline(always)]
 fn mix(mut h: u64) -> u64 {

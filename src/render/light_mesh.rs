@@ -4,9 +4,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::LightMeshes;
-use super::conventional::shade_traced;
+use super::hybrid::shade_hybrid;
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
+use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
 use crate::accel::Accel;
 use crate::light_mesh::{MeshPoints, NeededPoints, Neighbours, PointMask, Scratch};
@@ -64,7 +65,12 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         stats.rays.shadow += self.meshes.direct.evaluate(self.accel, self.scene, &needed);
     }
 
-    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
+    fn shade(
+        &self,
+        tile: &Tile,
+        vertices: &[PathVertex],
+        emit: &mut dyn FnMut(&PathVertex, Vec3),
+    ) -> ShadeCounters {
         pulp::Arch::new().dispatch(|| {
             let scale = direct_scale(self.settings);
             let LightMeshes { direct, indirect } = &*self.meshes;
@@ -81,15 +87,8 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
             if self.settings.light_mesh.resolve == Resolve::Trace
                 && self.settings.light_mesh.estimator == Estimator::PerLight
             {
-                shadow_rays = shade_traced(
-                    self.accel,
-                    direct.lights(),
-                    vertices,
-                    &mut add_indirect,
-                    |vertex, seen, mixed| {
-                        direct.verdict(self.accel, &vertex.surface, &mut scratch, seen, mixed);
-                    },
-                );
+                shadow_rays =
+                    shade_hybrid(self.accel, direct, tile, vertices, &mut scratch, &mut add_indirect);
             } else {
                 for vertex in vertices {
                     add_indirect(vertex, direct.illumination(self.accel, &vertex.surface, &mut scratch));

@@ -3,10 +3,12 @@
 
 mod camera_rays;
 mod conventional;
+mod hybrid;
 mod light_mesh;
 mod paths;
 mod reference;
 mod stats;
+mod surface_group;
 mod tiles;
 mod wavefront;
 

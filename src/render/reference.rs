@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
+use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
 use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayPacket};
 use crate::light_mesh::{
@@ -156,7 +157,12 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ReferenceIntegrator<'_, A> {
     fn prepare(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters {
+    fn shade(
+        &self,
+        _: &Tile,
+        vertices: &[PathVertex],
+        emit: &mut dyn FnMut(&PathVertex, Vec3),
+    ) -> ShadeCounters {
         let basis = Basis::of(self.settings.light_mesh.estimator);
         let scale = direct_scale(self.settings);
         let mut counters = ShadeCounters::default();

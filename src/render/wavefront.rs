@@ -33,8 +33,13 @@ pub(super) trait BlockIntegrator: Sync {
     /// Makes ready what the surface points of a block need.
     fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
 
-    /// Shades surface points: calls `emit(vertex, E)` for each, E such that k_d·E is the light sent back.
-    fn shade(&self, vertices: &[PathVertex], emit: &mut dyn FnMut(&PathVertex, Vec3)) -> ShadeCounters;
+    /// Shades surface points of a tile: calls `emit(vertex, E)` for each, E such that k_d·E is the light sent back.
+    fn shade(
+        &self,
+        tile: &Tile,
+        vertices: &[PathVertex],
+        emit: &mut dyn FnMut(&PathVertex, Vec3),
+    ) -> ShadeCounters;
 }
 
 /// What shading one tile counted.
@@ -138,7 +143,7 @@ fn shade_tile<I: BlockIntegrator>(
 ) -> (Vec<Vec3>, ShadeCounters) {
     let mut pixels = paths.background.clone();
     debug_assert_eq!(pixels.len(), tile.pixels());
-    let counters = integrator.shade(&paths.vertices, &mut |vertex, illumination| {
+    let counters = integrator.shade(tile, &paths.vertices, &mut |vertex, illumination| {
         let SurfacePoint { emission, diffuse, .. } = vertex.surface;
         pixels[vertex.pixel as usize] += vertex.weight * (emission + diffuse * illumination);
     });

@@ -26,8 +26,10 @@ points::point_table! {
     #[derive(Default)]
     pub struct IndirectTable {
         directions: Option<Count<1_000_000>>,
+        emitter_samples: Option<Count<1_000_000, 0>>,
         bounces: Option<Count<1_000>>,
         tolerance: Option<NonNegative>,
+        at_surface: Option<bool>,
         form: Option<FormName>,
         normalization: Option<NormalizationName>,
     }
@@ -86,13 +88,13 @@ impl LightMeshTable {
                 ResolveName::Trace => Resolve::Trace,
             };
         }
-        // The indirect mesh's points are the direct one's unless its table says otherwise.
+        // The indirect mesh's points follow from the direct one's unless its table says otherwise.
         if let Some(indirect) = &mut settings.indirect {
-            indirect.points = settings.points.clone();
+            indirect.points = IndirectSettings::coarser(&settings.points);
         }
         if let Some(table) = &self.indirect {
             let indirect = settings.indirect.get_or_insert_with(|| IndirectSettings {
-                points: settings.points.clone(),
+                points: IndirectSettings::coarser(&settings.points),
                 ..Default::default()
             });
             table.apply(indirect, folder, places)?;
@@ -110,8 +112,10 @@ impl IndirectTable {
     ) -> Result<(), LoadError> {
         self.point_keys("light_mesh.indirect").apply(&mut settings.points, folder, places)?;
         settings.directions = self.directions.map_or(settings.directions, |count| count.0);
+        settings.emitter_samples = self.emitter_samples.map_or(settings.emitter_samples, |count| count.0);
         settings.bounces = self.bounces.map_or(settings.bounces, |count| count.0);
         settings.tolerance = self.tolerance.map_or(settings.tolerance, |share| share.0);
+        settings.at_surface = self.at_surface.unwrap_or(settings.at_surface);
         if let Some(name) = self.form {
             settings.form = match name {
                 FormName::Scalar => IndirectForm::Scalar,

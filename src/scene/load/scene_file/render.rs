@@ -7,7 +7,7 @@ use super::place::Places;
 use super::values::{Count, Fraction, Stops};
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Settings};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
 
 /// Pixels that a picture may have.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -50,9 +50,12 @@ impl PresetName {
                 *falloff = Falloff::InverseSquare;
                 settings.lambertian = true;
                 settings.light_mesh.estimator = Estimator::PerLight;
+                // Point lights cast sharp shadows.
+                settings.light_mesh.resolve = Resolve::Trace;
                 settings.light_mesh.indirect = Some(IndirectSettings {
                     form: IndirectForm::Directional,
                     bounces: 16,
+                    at_surface: true,
                     ..IndirectSettings::default()
                 });
             }

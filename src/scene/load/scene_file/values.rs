@@ -146,16 +146,16 @@ vector!(
     /// One number for all axes or one per axis, each > 0.
     Lengths, one_or_three, |v| v.min_element() > 0.0, "be greater than 0");
 
-/// A count in [1, `MAX`].
+/// A count in [`MIN`, `MAX`].
 #[derive(Clone, Copy, Debug)]
-pub struct Count<const MAX: u32>(pub u32);
+pub struct Count<const MAX: u32, const MIN: u32 = 1>(pub u32);
 
-impl<'de, const MAX: u32> Deserialize<'de> for Count<MAX> {
+impl<'de, const MAX: u32, const MIN: u32> Deserialize<'de> for Count<MAX, MIN> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = i64::deserialize(deserializer)?;
         match u32::try_from(value) {
-            Ok(count) if (1..=MAX).contains(&count) => Ok(Self(count)),
-            _ => Err(de::Error::custom(format!("must lie in [1, {MAX}], found {value}"))),
+            Ok(count) if (MIN..=MAX).contains(&count) => Ok(Self(count)),
+            _ => Err(de::Error::custom(format!("must lie in [{MIN}, {MAX}], found {value}"))),
         }
     }
 }
