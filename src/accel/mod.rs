@@ -19,7 +19,9 @@ pub use ray::*;
 
 /// Ray queries against one scene.
 ///
-/// All queries count a triangle as hit from both sides. Triangles with a cut-out
+/// All queries count a triangle as hit from both sides. Triangles with a coordinate that is not finite or beyond
+/// ±[`MAX_COORDINATE`] are never hit, nor are instances whose [placement can't be undone](largest_coordinate_of);
+/// rays that are [not valid](Ray::is_valid) hit nothing. Triangles with a cut-out
 /// ([`TriangleMesh::cutout`](crate::scene::TriangleMesh::cutout)) are hit only where it is opaque. A
 /// hit exactly at either end of the valid interval may or may not be reported.
 pub trait Accel: Send + Sync {
