@@ -12,7 +12,7 @@ use lightmesh::accel::{
 };
 use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::scene::random::SplitMix64;
-use lightmesh::scene::{CutOut, Instance, Positions, Scene, TriangleMaterials, TriangleMesh};
+use lightmesh::scene::{CutOut, Instance, Material, Positions, Scene, TriangleMaterials, TriangleMesh};
 use lightmesh::with_accel;
 
 fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
@@ -30,7 +30,7 @@ fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOu
 
 fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
     let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, ..Scene::default() }
+    Scene { meshes, instances, materials: vec![Material::default()], ..Scene::default() }
 }
 
 fn soup(seed: u64, count: u32, size: f32, cutout: Option<CutOut>) -> Arc<TriangleMesh> {

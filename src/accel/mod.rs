@@ -8,6 +8,7 @@ mod brute_force;
 pub mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
+mod memory;
 mod ray;
 
 pub use backend::{Backend, BackendChoice, BackendError, Chosen};
@@ -15,6 +16,7 @@ pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]
 pub use embree::{EmbreeAccel, EmbreeError};
+pub use memory::{Footprint, MemoryEstimate, MemoryLimitError, check_memory, parse_size};
 pub use ray::*;
 
 /// Ray queries against one scene.

@@ -8,7 +8,9 @@ use clap::Args;
 use glam::Vec3;
 
 use super::progress::Reporter;
-use crate::accel::{Accel, Backend, BackendChoice, BackendError, Ray};
+use crate::accel::{
+    Accel, Backend, BackendChoice, BackendError, MemoryLimitError, Ray, check_memory, parse_size,
+};
 use crate::crosscheck::{Options, RayTextError, Subject, crosscheck, from_text, replay, watertightness};
 use crate::image::{ImageError, OutputFile};
 use crate::render::Progress;
@@ -36,6 +38,9 @@ pub struct CrosscheckArgs {
     /// elsewhere, in place of the comparison; fails where more than one in 10⁷ does
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point, conflicts_with = "replay")]
     pub inside: Option<Vec3>,
+    /// Refuse a scene that would take more memory in all backends together, by an estimate: 500M, 8G
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub memory_limit: Option<u64>,
     /// Threads; 0 for one per processor
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
     pub threads: u16,
@@ -62,6 +67,14 @@ pub enum CrosscheckError {
     /// A backend that is there failed.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// The scene is larger than allowed.
+    #[error("{}: {error}", scene.display())]
+    MemoryLimit {
+        /// The scene file.
+        scene: PathBuf,
+        /// The estimate.
+        error: MemoryLimitError,
+    },
     /// The file with rays can't be read.
     #[error("cannot read {}: {error}", file.display())]
     Rays {
@@ -101,6 +114,8 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Verdict, Crossc
     let loaded = pool.install(|| open_scene(&args.scene))?.loaded;
     let scene = &loaded.scene;
 
+    check_memory(scene, &[BackendChoice::Bvh, BackendChoice::Auto], args.memory_limit)
+        .map_err(|error| CrosscheckError::MemoryLimit { scene: args.scene.clone(), error })?;
     let mut backends = vec![pool.install(|| Backend::build(BackendChoice::Bvh, scene))?.backend];
     // Falls back to the BVH, which is there already, where no Embree is installed.
     let chosen = pool.install(|| Backend::build(BackendChoice::Auto, scene))?;

@@ -255,8 +255,17 @@ impl Crossing {
         let longest = lengths.into_iter().fold(0.0, f64::max);
         let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
         let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
-        let doubts = lengths
-            .map(|side| if overflow { f64::INFINITY } else { moved * side + UNDERFLOW / length.min(1.0) });
+        let distances = flat.map(|[x, y]| x.hypot(y));
+        // Boxes keep ray tracers from triangles that are nowhere near.
+        if distances.into_iter().fold(f64::INFINITY, f64::min) > longest + 4.0 * moved {
+            return None;
+        }
+        let doubts: [f64; 3] = std::array::from_fn(|i| {
+            let (p, q) = sides[i];
+            // A moved corner turns its edge about the other one.
+            let widened = moved * (lengths[i] + distances[p] + distances[q]);
+            if overflow { f64::INFINITY } else { widened + UNDERFLOW / length.min(1.0) }
+        });
         let sign = |i: usize| {
             if edges[i] > doubts[i] {
                 1
@@ -298,13 +307,15 @@ impl Crossing {
         };
         let weight_error = if parallel { 1.0 } else { turned / (cosine - turned) };
         let total = edges[0] + edges[1] + edges[2];
+        // Of a triangle that is seen edge-on it is no number.
+        let weight = |part: f64| if part.is_finite() { part } else { 1.0 / 3.0 };
         Some(Self {
             t,
             error,
             certain: inside && !parallel,
             in_plane: parallel,
-            u: edges[1] / total,
-            v: edges[2] / total,
+            u: weight(edges[1] / total),
+            v: weight(edges[2] / total),
             weight_error: weight_error.min(1.0),
         })
     }

@@ -210,10 +210,14 @@ fn admits(judge: &Judge, ray: &Ray, truth: &Truth, answer: &Answer) -> bool {
 
 /// What kind of difference it is that has an explanation.
 fn explained(judge: &Judge, ray: &Ray, answer: &Answer, reference: Option<&Hit>, worst: &mut f64) -> Class {
-    let (Answer::Nearest(Some(a)), Some(b)) = (answer, reference) else { return Class::Graze };
     let candidate = |hit: &Hit| judge.test(ray, hit.instance, hit.triangle);
-    let (Some(first), Some(second)) = (candidate(a), candidate(b)) else { return Class::Graze };
-    if !first.is_near(f64::from(a.t)) || !second.is_near(f64::from(b.t)) {
+    let Answer::Nearest(Some(a)) = answer else { return Class::Graze };
+    let Some(first) = candidate(a) else { return Class::Graze };
+    if !first.is_near(f64::from(a.t)) {
+        return Class::InPlane;
+    }
+    let Some((b, second)) = reference.and_then(|b| Some((b, candidate(b)?))) else { return Class::Graze };
+    if !second.is_near(f64::from(b.t)) {
         return Class::InPlane;
     }
     if (a.instance, a.triangle) == (b.instance, b.triangle) {
