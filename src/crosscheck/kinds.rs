@@ -39,7 +39,7 @@ kinds! {
     Axis "axis" "Parallel to an axis, many through vertices.",
     Zeros "zeros" "With direction components that are 0 or −0.",
     Denormal "denormal" "With direction components that are denormal or next to it.",
-    Far "far" "From up to a million times the scene's size away.",
+    Far "far" "From up to a thousand times the scene's size away.",
     Surface "surface" "Starting or ending on triangles.",
     Mixed "mixed" "All the others in one packet.",
 }
@@ -248,7 +248,7 @@ impl<'a> RaySource<'a> {
             }
             Kind::Far => {
                 let size = self.bounds.extent().max_element().max(f32::MIN_POSITIVE);
-                let far = inside + size * 10f32.powf(random.between(0.0, 6.0)) * direction(random);
+                let far = inside + size * 10f32.powf(random.between(0.0, 3.0)) * direction(random);
                 aimed(far, [inside, inside, on_edge, a][random.next() as usize % 4], random)
             }
             _ => {
