@@ -314,7 +314,7 @@ fn the_report_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn escapes_are_counted() {
     let corners = vec![[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-    let faces = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+    let faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
     for (count, tight) in [(4, true), (3, false)] {
         let scene = scene(vec![mesh(corners.clone(), faces[..count].to_vec(), None)], vec![(0, None)]);
         let bvh = BvhAccel::build(&scene).unwrap();
