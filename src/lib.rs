@@ -5,6 +5,7 @@
 pub mod accel;
 pub mod bench;
 pub mod cli;
+pub mod crosscheck;
 pub mod image;
 pub mod light_mesh;
 pub mod render;

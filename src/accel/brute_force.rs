@@ -7,7 +7,10 @@ use glam::Vec3;
 use crate::scene::{Scene, TriangleMesh};
 
 use super::bvh::WorldToObject;
-use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
+use super::{
+    Accel, Coherence, Hit, INVALID_ID, LaneMask, MAX_COORDINATE, Ray, RayHitPacket, RayPacket,
+    largest_coordinate,
+};
 
 /// The reference backend for tests.
 ///
@@ -15,6 +18,8 @@ use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayP
 /// boxes, no SIMD and no stack. Its arithmetic is that of the BVH, so that hits must agree to the last bit.
 pub struct BruteForceAccel {
     instances: Vec<(Arc<TriangleMesh>, Placement)>,
+    /// Of the coordinates of rays.
+    largest: f32,
 }
 
 enum Placement {
@@ -36,11 +41,14 @@ impl BruteForceAccel {
             };
             Some((scene.meshes.get(instance.mesh as usize)?.clone(), placement))
         });
-        Self { instances: instances.collect() }
+        Self { instances: instances.collect(), largest: largest_coordinate(scene) }
     }
 
     /// Calls `found` with every hit; stops when that returns true.
     fn each_hit(&self, ray: &Ray, mut found: impl FnMut(Hit) -> bool) {
+        if !ray.is_valid(self.largest) {
+            return;
+        }
         for (instance, (mesh, placement)) in self.instances.iter().enumerate() {
             let local = match placement {
                 Placement::World => *ray,
@@ -66,7 +74,7 @@ impl BruteForceAccel {
 
 /// t, u, v of a hit with t in the ray's interval, cut to t ≥ 0.
 fn hit_triangle(ray: &Ray, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
-    if !corners.iter().all(|corner| corner.is_finite()) {
+    if !corners.iter().all(|corner| corner.abs().cmple(Vec3::splat(MAX_COORDINATE)).all()) {
         return None;
     }
     let d = ray.direction;

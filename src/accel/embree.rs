@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use embree_sys::{Device, Error, Geometry, Library, SceneBuilder};
-use glam::Affine3A;
 use thiserror::Error as ThisError;
 
+use super::ray::columns;
 use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
 use crate::scene::{Scene, TriangleMesh};
 
@@ -86,7 +86,7 @@ impl EmbreeAccel {
                             placed.entry(instance.mesh).or_insert(object)
                         }
                     };
-                    match Geometry::instance(object, columns(to_world)) {
+                    match Geometry::instance(object, columns(&to_world)) {
                         // Rays cannot be brought into its space: never hit, as in the other backends.
                         Err(Error::Transform) => continue,
                         geometry => geometry.map_err(mesh_error)?,
@@ -120,10 +120,6 @@ fn object(device: &Device, mesh: &TriangleMesh) -> Result<embree_sys::Scene, Err
     let mut builder = SceneBuilder::new(device)?;
     builder.attach(0, triangles(device, mesh)?)?;
     builder.commit()
-}
-
-fn columns(map: Affine3A) -> [[f32; 3]; 4] {
-    [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation].map(|v| v.to_array())
 }
 
 #[inline(always)]

@@ -8,6 +8,7 @@ mod brute_force;
 pub mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
+mod memory;
 mod ray;
 
 pub use backend::{Backend, BackendChoice, BackendError, Chosen};
@@ -15,11 +16,14 @@ pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]
 pub use embree::{EmbreeAccel, EmbreeError};
+pub use memory::{Footprint, MemoryEstimate, MemoryLimitError, check_memory, parse_size};
 pub use ray::*;
 
 /// Ray queries against one scene.
 ///
-/// All queries count a triangle as hit from both sides. Triangles with a cut-out
+/// All queries count a triangle as hit from both sides. Triangles with a coordinate that is not finite or beyond
+/// ±[`MAX_COORDINATE`] are never hit, nor are instances whose [placement can't be undone](largest_coordinate_of);
+/// rays that are [not valid](Ray::is_valid) hit nothing. Triangles with a cut-out
 /// ([`TriangleMesh::cutout`](crate::scene::TriangleMesh::cutout)) are hit only where it is opaque. A
 /// hit exactly at either end of the valid interval may or may not be reported.
 pub trait Accel: Send + Sync {

@@ -1,8 +1,11 @@
 //! Rays and hits, single and in packets; the one convention that all backends share.
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
-pub use embree_sys::packet::{HitPacket, INVALID_ID, RayHitPacket, RayPacket};
+pub use embree_sys::packet::{HitPacket, INVALID_ID, MAX_COORDINATE, MIN_DIRECTION, RayHitPacket, RayPacket};
+use embree_sys::placement;
+
+use crate::scene::Scene;
 
 /// A ray `origin + t * direction` for `t_near <= t <= t_far`.
 ///
@@ -12,7 +15,7 @@ pub use embree_sys::packet::{HitPacket, INVALID_ID, RayHitPacket, RayPacket};
 pub struct Ray {
     /// Start point, scene units.
     pub origin: Vec3,
-    /// Direction, any length but 0.
+    /// Direction, of any length; but where no component reaches [`MIN_DIRECTION`], it is none, and nothing is hit.
     pub direction: Vec3,
     /// Start of the valid interval.
     pub t_near: f32,
@@ -30,6 +33,33 @@ impl Ray {
     pub fn between(from: Vec3, to: Vec3) -> Self {
         Self { origin: from, direction: to - from, t_near: 0.0, t_far: 1.0 }
     }
+
+    /// Whether the ray can hit anything: it has a direction and an interval that is not empty, and no number
+    /// that isn't one. `largest` is that of [`largest_coordinate`].
+    #[inline(always)]
+    pub fn is_valid(&self, largest: f32) -> bool {
+        let within = |v: Vec3| v.abs().cmple(Vec3::splat(largest)).all();
+        let direction = within(self.direction) && self.direction.abs().max_element() >= MIN_DIRECTION;
+        within(self.origin) && direction && self.t_near <= self.t_far && self.t_far >= 0.0
+    }
+}
+
+/// Largest magnitude of the coordinates of rays that can hit anything in a scene: [`MAX_COORDINATE`], or less
+/// where instances scale rays up, but never below 10⁹.
+pub fn largest_coordinate(scene: &Scene) -> f32 {
+    let placed = scene.instances.iter().filter_map(|instance| instance.to_world.as_ref());
+    placed.filter_map(largest_coordinate_of).fold(MAX_COORDINATE, f32::min)
+}
+
+/// The same for one placement; `None` for one that can't be undone, whose triangles are never hit: it is
+/// not finite, or flattens space to less than 10⁻⁵, or leaves less than 10⁹ for rays.
+pub fn largest_coordinate_of(to_world: &Affine3A) -> Option<f32> {
+    placement::largest_coordinate(&columns(to_world))
+}
+
+/// The axes of a placement, then its origin.
+pub(super) fn columns(map: &Affine3A) -> [[f32; 3]; 4] {
+    [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation].map(|v| v.to_array())
 }
 
 /// Nearest hit of a ray, the same for every backend.

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use crate::accel::{Footprint, MemoryEstimate};
+use crate::scene::LightShape;
 use crate::scene::load::{LoadError, OpenedScene, open_scene};
-use crate::scene::{LightShape, Scene};
 
 /// What `info` takes.
 #[derive(Args, Debug)]
@@ -40,7 +41,7 @@ struct Info {
     lights: Lights,
     cameras: Vec<String>,
     bounds: Option<[[f32; 3]; 2]>,
-    memory_estimate_bytes: Memory,
+    memory_estimate_bytes: MemoryEstimate,
     skipped: Vec<(&'static str, u64)>,
     warnings: Vec<String>,
     chosen: Vec<String>,
@@ -52,18 +53,6 @@ struct Lights {
     spot: usize,
     directional: usize,
 }
-
-#[derive(Serialize)]
-struct Memory {
-    scene: u64,
-    embree: u64,
-    bvh: u64,
-}
-
-/// Estimates of the bytes that Embree's robust trees of medium quality take per triangle, and per instance.
-const EMBREE_BYTES: (u64, u64) = (110, 700);
-/// The same for the built-in BVH.
-const BVH_BYTES: (u64, u64) = (90, 260);
 
 impl Info {
     fn new(opened: &OpenedScene) -> Self {
@@ -78,10 +67,6 @@ impl Info {
             }
         }
         let unique_triangles = scene.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum();
-        let tree = |(triangle, instance): (u64, u64)| {
-            let placed = scene.instances.iter().filter(|instance| instance.to_world.is_some()).count();
-            unique_triangles * triangle + placed as u64 * instance
-        };
         let bounds = scene.bounds();
         Self {
             triangles: scene.triangle_count(),
@@ -92,11 +77,7 @@ impl Info {
             lights,
             cameras: loaded.cameras.iter().map(|camera| camera.name.clone()).collect(),
             bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),
-            memory_estimate_bytes: Memory {
-                scene: scene_bytes(scene),
-                embree: tree(EMBREE_BYTES),
-                bvh: tree(BVH_BYTES),
-            },
+            memory_estimate_bytes: MemoryEstimate::of(scene),
             skipped: loaded.skipped.named().into_iter().filter(|(_, count)| *count > 0).collect(),
             warnings: loaded.warnings.iter().map(ToString::to_string).collect(),
             chosen: choices.clone(),
@@ -114,12 +95,12 @@ impl Info {
         if let Some([min, max]) = self.bounds {
             writeln!(out, "bounds     {min:?} to {max:?}")?;
         }
-        let Memory { scene, embree, bvh } = self.memory_estimate_bytes;
-        let (scene, embree, bvh) = (mega(scene), mega(embree), mega(bvh));
-        writeln!(
-            out,
-            "memory     about {scene:.1} MB, and {embree:.1} MB in Embree or {bvh:.1} MB in the built-in BVH"
-        )?;
+        let MemoryEstimate { scene, embree, bvh } = self.memory_estimate_bytes;
+        let tree = |tree: Footprint| {
+            format!("{:.1} MB ({:.1} while it is built)", mega(tree.built), mega(tree.building))
+        };
+        let (scene, embree, bvh) = (mega(scene), tree(embree), tree(bvh));
+        writeln!(out, "memory     about {scene:.1} MB, and {embree} in Embree or {bvh} in the built-in BVH")?;
         for (name, count) in &self.skipped {
             writeln!(out, "left out   {count} {name}")?;
         }
@@ -131,18 +112,6 @@ impl Info {
         }
         Ok(())
     }
-}
-
-/// Bytes of the scene's own vertices, indices and materials.
-fn scene_bytes(scene: &Scene) -> u64 {
-    let of_mesh = |mesh: &crate::scene::TriangleMesh| {
-        let per_vertex = 12
-            + mesh.normals.as_ref().map_or(0, |_| 12)
-            + mesh.uvs.as_ref().map_or(0, |_| 8)
-            + mesh.colors.as_ref().map_or(0, |_| 12);
-        mesh.positions.as_slice().len() * per_vertex + mesh.triangles.len() * 16
-    };
-    scene.meshes.iter().map(|mesh| of_mesh(mesh) as u64).sum()
 }
 
 /// Prints what a file holds.

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod compare;
+pub mod crosscheck;
 pub mod gallery;
 mod gallery_page;
 pub mod generate;
@@ -36,6 +37,8 @@ enum Command {
     Generate(generate::GenerateArgs),
     /// Measure speed.
     Bench(bench::BenchArgs),
+    /// Trace rays with every backend and judge what they disagree about.
+    Crosscheck(crosscheck::CrosscheckArgs),
     /// Render the scenes of a list and write a page about them.
     Gallery(gallery::GalleryArgs),
     /// Measure how far a picture is from a reference.
@@ -70,6 +73,16 @@ pub fn main() -> ExitCode {
         Command::Bench(args) => match bench::run(args, &mut out) {
             Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
             result => result.map_err(anything),
+        },
+        Command::Crosscheck(args) => match crosscheck::run(args, &mut out) {
+            Ok(crosscheck::Verdict::Passed) => Ok(()),
+            Ok(crosscheck::Verdict::Failed) => {
+                // What could not be told makes no difference to the verdict.
+                let _ = out.flush();
+                return ExitCode::FAILURE;
+            }
+            Err(crosscheck::CrosscheckError::Print(error)) => Err(anything(error)),
+            Err(error) => Err(anything(error)),
         },
         Command::Gallery(args) => gallery::run(args).map_err(anything),
         Command::Compare(args) => match compare::run(args, &mut out) {

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::progress::Reporter;
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
-use crate::accel::{Accel, Backend, BackendChoice, BackendError};
+use crate::accel::{Accel, Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{Image, ImageError, exr::SampleType};
 use crate::light_mesh::MeshError;
@@ -34,6 +34,9 @@ pub struct RenderArgs {
     /// Library that traces the rays
     #[arg(long, value_enum, default_value_t)]
     pub backend: BackendChoice,
+    /// Refuse a scene that would take more memory while it is built, by an estimate: 500M, 8G
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub memory_limit: Option<u64>,
     /// Threads; 0 for one per processor
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
     pub threads: u16,
@@ -181,6 +184,14 @@ pub enum RenderError {
     /// No backend.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// The scene is larger than allowed.
+    #[error("{}: {error}", scene.display())]
+    MemoryLimit {
+        /// The scene file.
+        scene: PathBuf,
+        /// The estimate.
+        error: MemoryLimitError,
+    },
     /// The light meshes don't fit the scene.
     #[error("{}: {error}", scene.display())]
     Mesh {
@@ -251,6 +262,8 @@ fn render_to(
 
     let stage = Instant::now();
     let spinner = reporter.spinner("building");
+    check_memory(&scene, &[args.backend], args.memory_limit)
+        .map_err(|error| RenderError::MemoryLimit { scene: args.scene.clone(), error })?;
     let chosen = Backend::build(args.backend, &scene)?;
     spinner.finish_and_clear();
     if let Some(notice) = &chosen.notice {

@@ -39,6 +39,7 @@ mod layout;
 #[cfg(feature = "runtime")]
 mod library;
 pub mod packet;
+pub mod placement;
 #[cfg(feature = "runtime")]
 mod query;
 #[cfg(feature = "runtime")]

@@ -11,6 +11,10 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// beyond it are left out of a scene; Debian's builds abort on rays that start or point beyond it.
 pub const MAX_COORDINATE: f32 = 1.844e18;
 
+/// A ray whose direction has no component of at least this size has none: Embree takes components below 10⁻¹⁸ for
+/// that much, which must stay far below the rounding of the others.
+pub const MIN_DIRECTION: f32 = 1e-10;
+
 /// Packet of `N` rays as a structure of arrays, `N` being 4, 8 or 16 (`RTCRay4`, `RTCRay8`, `RTCRay16`).
 ///
 /// A ray is `org + t * dir` for `tnear <= t <= tfar`; `dir` need not be normalised, `t` is in units of
@@ -100,8 +104,8 @@ impl<const N: usize> RayPacket<N> {
 
     /// Which lanes hold a ray that can hit something: −1 for those, 0 for the others.
     ///
-    /// Origin and direction must lie within ±`largest` (so they aren't NaN), and the interval must be
-    /// one: `tnear` ≤ `tfar` and 0 ≤ `tfar`.
+    /// Origin and direction must lie within ±`largest` (so they aren't NaN), the direction must not be shorter
+    /// than [`MIN_DIRECTION`], and the interval must be one: `tnear` ≤ `tfar` and 0 ≤ `tfar`.
     #[inline(always)]
     pub fn valid_lanes(&self, largest: f32) -> [i32; N] {
         let mut valid = [0; N];
@@ -112,8 +116,11 @@ impl<const N: usize> RayPacket<N> {
                 & (self.dir_x[lane].abs() <= largest)
                 & (self.dir_y[lane].abs() <= largest)
                 & (self.dir_z[lane].abs() <= largest);
+            let direction = (self.dir_x[lane].abs() >= MIN_DIRECTION)
+                | (self.dir_y[lane].abs() >= MIN_DIRECTION)
+                | (self.dir_z[lane].abs() >= MIN_DIRECTION);
             let interval = (self.tfar[lane] >= self.tnear[lane]) & (self.tfar[lane] >= 0.0);
-            *valid = -i32::from(within & interval);
+            *valid = -i32::from(within & direction & interval);
         }
         valid
     }

@@ -1,14 +1,14 @@
 //! Ray queries against a committed scene. None of them can fail or allocate.
 //!
 //! Rays that are none hit nothing: a component of origin or direction that is NaN or larger than
-//! [`Scene::largest_coordinate`], or an empty interval. They are kept from Embree, whose Debian builds
+//! [`Scene::largest_coordinate`], a direction below [`MIN_DIRECTION`], or an empty interval. They are kept from Embree, whose Debian builds
 //! have assertions on and abort on them. So they do on `tnear` < 0, which counts as 0 here.
 
 use std::ptr;
 
 use crate::bindings::{embree3 as v3, embree4 as v4};
 use crate::library::Api;
-use crate::packet::{INVALID_ID, RayHitPacket, RayPacket};
+use crate::packet::{INVALID_ID, MIN_DIRECTION, RayHitPacket, RayPacket};
 use crate::scene::Scene;
 
 /// A ray `origin + t * direction` for `tnear <= t <= tfar`; the direction need not be normalised.
@@ -30,7 +30,8 @@ impl Ray {
     fn is_valid(&self, largest: f32) -> bool {
         let within = |v: &[f32; 3]| v.iter().all(|x| x.abs() <= largest);
         let interval = self.tfar >= self.tnear && self.tfar >= 0.0;
-        within(&self.origin) && within(&self.direction) && interval
+        let long = self.direction.iter().any(|d| d.abs() >= MIN_DIRECTION);
+        within(&self.origin) && within(&self.direction) && long && interval
     }
 }
 
@@ -49,6 +50,15 @@ pub struct Hit {
     pub geom_id: u32,
     /// Instance within the scene, [`INVALID_ID`] for geometry that is not instanced.
     pub inst_id: u32,
+}
+
+/// Direction components below this are 0 to Embree's boxes, but not to its packets' frusta, which lose hits over
+/// the difference.
+const TINY: f32 = 1e-18;
+
+#[inline(always)]
+fn without_tiny(direction: f32) -> f32 {
+    if direction.abs() < TINY { 0.0 } else { direction }
 }
 
 /// Per-lane flags as Embree wants them: −1 or 0, aligned for the widest packets.
@@ -71,7 +81,8 @@ const FOUR_LANES: [[i32; 4]; 16] = {
 };
 
 impl Valid {
-    /// The active lanes whose rays Embree takes; their `tnear` is made to be at least 0.
+    /// The active lanes whose rays Embree takes; their `tnear` is made to be at least 0, and directions without
+    /// tiny components.
     #[inline(always)]
     fn new<const N: usize>(active: u32, rays: &mut RayPacket<N>, largest: f32) -> Self {
         let mut valid = Self([0; 16]);
@@ -85,6 +96,9 @@ impl Valid {
         for (tnear, valid) in rays.tnear.iter_mut().zip(&valid.0) {
             // No branch, so that it vectorises. No valid lane's is NaN.
             *tnear = if (*valid != 0) & (*tnear < 0.0) { 0.0 } else { *tnear };
+        }
+        for directions in [&mut rays.dir_x, &mut rays.dir_y, &mut rays.dir_z] {
+            directions.iter_mut().for_each(|direction| *direction = without_tiny(*direction));
         }
         valid
     }
@@ -140,7 +154,7 @@ fn occluded4(coherent: bool) -> v4::RTCOccludedArguments {
 
 #[inline(always)]
 fn raw_ray(ray: &Ray) -> v4::RTCRay {
-    let ([org_x, org_y, org_z], [dir_x, dir_y, dir_z]) = (ray.origin, ray.direction);
+    let ([org_x, org_y, org_z], [dir_x, dir_y, dir_z]) = (ray.origin, ray.direction.map(without_tiny));
     v4::RTCRay {
         org_x,
         org_y,

@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
-use crate::accel::Ray;
+use crate::accel::{Ray, largest_coordinate_of};
 
 use super::lanes::map3;
 
@@ -13,10 +13,8 @@ pub struct WorldToObject([[f32; 4]; 3]);
 impl WorldToObject {
     /// The inverse of a placement; `None` if it has none: such an instance is never hit.
     pub fn new(to_world: &Affine3A) -> Option<Self> {
+        largest_coordinate_of(to_world)?;
         let to_world = double(to_world);
-        if !(to_world.is_finite() && to_world.matrix3.determinant() != 0.0) {
-            return None;
-        }
         let inverse = to_world.inverse();
         let columns =
             [inverse.matrix3.x_axis, inverse.matrix3.y_axis, inverse.matrix3.z_axis, inverse.translation];

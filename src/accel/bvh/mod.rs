@@ -21,6 +21,7 @@ mod traverse_packet;
 mod triangle;
 mod validate;
 
+use super::largest_coordinate;
 use crate::scene::Scene;
 
 use blas::Blas;
@@ -89,13 +90,15 @@ pub struct BvhAccel {
     instances: Instances,
     dispatch: query::Dispatch,
     level: SimdLevel,
+    /// Of the coordinates of rays.
+    largest: f32,
 }
 
 impl BvhAccel {
     /// Builds the acceleration structure on rayon's threads, for the best instruction set there is.
     ///
-    /// Triangles with coordinates that are not finite are left out, and so are instances whose
-    /// transform can't be inverted.
+    /// Triangles with coordinates that are not finite or beyond [`MAX_COORDINATE`](super::MAX_COORDINATE) are left
+    /// out, and so are instances whose [transform can't be undone](super::largest_coordinate_of).
     pub fn build(scene: &Scene) -> Result<Self, BvhError> {
         Self::with_level(scene, SimdLevel::best())
     }
@@ -111,7 +114,7 @@ impl BvhAccel {
         if needed > top_level::STACK {
             return Err(BvhError::TooDeep { needed, limit: top_level::STACK });
         }
-        Ok(Self { fixed, instances, dispatch, level })
+        Ok(Self { fixed, instances, dispatch, level, largest: largest_coordinate(scene) })
     }
 
     /// The instruction set that queries use.

@@ -147,6 +147,13 @@ fn take<const N: usize, const W: usize>(first: usize, values: &[f32; N]) -> [f32
     lanes
 }
 
+/// The lanes with a ray, as a mask.
+#[inline(always)]
+fn valid_lanes<const N: usize>(packet: &RayPacket<N>, largest: f32) -> LaneMask {
+    let valid = packet.valid_lanes(largest);
+    valid.iter().enumerate().fold(0, |mask, (lane, &valid)| mask | (valid as u32 & 1) << lane)
+}
+
 /// Lanes `first..first + W` of a packet; lanes beyond its end are inactive.
 #[inline(always)]
 fn lanes_of<const N: usize, const W: usize>(
@@ -210,6 +217,7 @@ impl Accel for BvhAccel {
     }
 
     fn intersect_packet<const N: usize>(&self, active: LaneMask, packet: &mut RayHitPacket<N>, _: Coherence) {
+        let active = active & valid_lanes(&packet.ray, self.largest);
         #[cfg(target_arch = "x86_64")]
         if let (Dispatch::Avx512(simd), 16) = (self.dispatch, N) {
             let hits = self.intersect_wide(simd, &lanes_of(&packet.ray, 0, active));
@@ -227,6 +235,7 @@ impl Accel for BvhAccel {
         packet: &mut RayPacket<N>,
         _: Coherence,
     ) -> LaneMask {
+        let active = active & valid_lanes(packet, self.largest);
         #[cfg(target_arch = "x86_64")]
         if let (Dispatch::Avx512(simd), 16) = (self.dispatch, N) {
             return self.occluded_wide(simd, &lanes_of(packet, 0, active));

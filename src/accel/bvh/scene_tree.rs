@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::Vec3A;
 use rayon::prelude::*;
 
+use crate::accel::MAX_COORDINATE;
 use crate::scene::{Scene, TriangleMesh};
 
 use super::BvhError;
@@ -54,8 +55,9 @@ pub fn build_blas(meshes: &[(u32, &TriangleMesh)]) -> Result<Blas, BvhError> {
         let positions = mesh.positions.as_slice();
         primitives.par_extend(mesh.triangles.par_iter().enumerate().filter_map(|(index, corners)| {
             let [a, b, c] = corners_of(positions, corners)?.map(Vec3A::from_array);
-            let finite = a.is_finite() && b.is_finite() && c.is_finite();
-            finite.then(|| Primitive::new(a.min(b).min(c), a.max(b).max(c), part.first + index as u32))
+            // NaN is not within either.
+            let within = [a, b, c].iter().all(|p| p.abs().cmple(Vec3A::splat(MAX_COORDINATE)).all());
+            within.then(|| Primitive::new(a.min(b).min(c), a.max(b).max(c), part.first + index as u32))
         }));
     }
     let collapsed = build_wide(primitives);

@@ -91,7 +91,7 @@ impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketNeare
 impl BvhAccel {
     #[inline(always)]
     pub(super) fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
-        let single = SingleRay::new(ray)?;
+        let single = SingleRay::new(ray).filter(|_| ray.is_valid(self.largest))?;
         let nearest = self.fixed.intersect::<S, STACK>(simd, &single);
         let mut best = None;
         self.offer_fixed(&nearest, &mut best);
@@ -136,7 +136,7 @@ impl BvhAccel {
 
     #[inline(always)]
     pub(super) fn occluded_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> bool {
-        let Some(single) = SingleRay::new(ray) else { return false };
+        let Some(single) = SingleRay::new(ray).filter(|_| ray.is_valid(self.largest)) else { return false };
         if self.fixed.occluded::<S, STACK>(simd, &single) {
             return true;
         }

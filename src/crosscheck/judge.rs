@@ -1,0 +1,334 @@
+//! What is true of a ray, in double precision, and what single precision may make of it.
+//!
+//! The bounds are derived in docs/crosscheck.md. In short: a ray tracer in single precision sees every corner
+//! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] asks whether a triangle is
+//! hit, missed, or within that doubt.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::boxes::{BoxTree, Walker};
+use super::placement::Placement;
+use crate::accel::{Hit, MAX_COORDINATE, Ray, largest_coordinate};
+use crate::scene::{Bounds, Scene};
+
+/// How far a corner seems moved, in units of its distance from the ray's origin: 16 roundings of 2⁻²⁴.
+pub const BOUND: f64 = 16.0 / (1 << 24) as f64;
+
+/// What single precision may add to a product of three lengths by rounding to denormals.
+const UNDERFLOW: f64 = 1e-40;
+
+/// Products beyond this may overflow in single precision.
+const OVERFLOW: f64 = 1e37;
+
+/// A triangle that a ray hits, or that it may be said to hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Triangle within the mesh.
+    pub triangle: u32,
+    /// Distance, in units of the direction's length.
+    pub t: f64,
+    /// By how much a distance in single precision may differ from `t`.
+    pub error: f64,
+    /// Whether every ray tracer has to find the hit.
+    pub certain: bool,
+    /// Whether the ray runs in the triangle's plane within the bound (from far away, small triangles have any
+    /// plane), so that distances are a quotient of two roundings.
+    pub in_plane: bool,
+}
+
+impl Candidate {
+    /// Whether a reported distance is that of this hit.
+    pub fn admits(&self, t: f64) -> bool {
+        self.in_plane || self.is_near(t)
+    }
+
+    /// Whether a distance lies where the triangle is.
+    pub fn is_near(&self, t: f64) -> bool {
+        (t - self.t).abs() <= self.error
+    }
+}
+
+/// What may be said of a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// No certain hit ends later than this; infinite if there is none.
+    pub certain_before: f64,
+    /// Whether any triangle is hit or in doubt.
+    pub any_possible: bool,
+}
+
+/// A scene in double precision.
+pub struct Judge<'a> {
+    scene: &'a Scene,
+    placements: Vec<Placement>,
+    /// By mesh.
+    trees: Vec<BoxTree>,
+    top: BoxTree,
+    /// Of the coordinates of rays.
+    largest: f32,
+}
+
+impl<'a> Judge<'a> {
+    /// Builds trees of its own over the scene.
+    pub fn new(scene: &'a Scene) -> Self {
+        let placements: Vec<_> =
+            scene.instances.iter().map(|i| Placement::new(i.to_world.as_ref())).collect();
+        let boxes_of = |mesh: &crate::scene::TriangleMesh| -> Vec<(Bounds, u32)> {
+            let triangles = 0..mesh.triangles.len() as u32;
+            let boxes = triangles.into_par_iter().filter_map(|triangle| {
+                let corners = mesh.corners(triangle);
+                let usable = corners
+                    .iter()
+                    .all(|corner| (corner.abs().cmple(glam::Vec3::splat(MAX_COORDINATE))).all());
+                usable.then(|| {
+                    let mut bounds = Bounds::EMPTY;
+                    corners.into_iter().for_each(|corner| bounds.extend(corner));
+                    (bounds, triangle)
+                })
+            });
+            boxes.collect()
+        };
+        let trees: Vec<_> = scene.meshes.par_iter().map(|mesh| BoxTree::new(&boxes_of(mesh))).collect();
+        let placed = scene.instances.iter().zip(&placements).zip(0..);
+        let boxes: Vec<_> = placed
+            .filter_map(|((instance, placement), number)| {
+                let mesh = scene.meshes.get(instance.mesh as usize)?;
+                let bounds = placement.world_bounds(&mesh.bounds())?;
+                (!bounds.is_empty()).then_some((bounds, number))
+            })
+            .collect();
+        Self { scene, placements, trees, top: BoxTree::new(&boxes), largest: largest_coordinate(scene) }
+    }
+
+    /// Whether the ray can hit anything at all.
+    pub fn is_ray(&self, ray: &Ray) -> bool {
+        ray.is_valid(self.largest)
+    }
+
+    /// Whether a ray hits a triangle; `None` where every ray tracer must say no.
+    pub fn test(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<Candidate> {
+        if !self.is_ray(ray) {
+            return None;
+        }
+        let local = self.placements.get(instance as usize)?.ray(ray)?;
+        self.test_local(ray, &local, instance, triangle)
+    }
+
+    fn test_local(&self, ray: &Ray, local: &LocalRay, instance: u32, triangle: u32) -> Option<Candidate> {
+        let mesh = self.scene.meshes.get(self.scene.instances.get(instance as usize)?.mesh as usize)?;
+        if triangle as usize >= mesh.triangles.len() {
+            return None;
+        }
+        let corners = mesh.corners(triangle);
+        if !corners.iter().all(|corner| corner.abs().cmple(glam::Vec3::splat(MAX_COORDINATE)).all()) {
+            return None;
+        }
+        let crossing = Crossing::new(local, corners.map(|corner| corner.as_dvec3() - local.origin))?;
+        let (near, far) = (f64::from(ray.t_near.max(0.0)), f64::from(ray.t_far));
+        let Crossing { t, error, .. } = crossing;
+        if t + error < near || t - error > far {
+            return None;
+        }
+        let within = t - error > near && t + error < far;
+        let mut certain = crossing.certain && within;
+        if let Some(opaque) = &mesh.cutout {
+            let answers = crossing.surroundings().map(|(u, v)| opaque(triangle, u, v));
+            if answers == [false; 9] && crossing.certain {
+                return None;
+            }
+            certain &= answers == [true; 9];
+        }
+        Some(Candidate { instance, triangle, t, error, certain, in_plane: crossing.in_plane })
+    }
+
+    /// Looks at all triangles near the ray.
+    pub fn truth(&self, ray: &Ray) -> Truth {
+        let mut truth = Truth { certain_before: f64::INFINITY, any_possible: false };
+        self.each_candidate(ray, |candidate| {
+            truth.any_possible = true;
+            if candidate.certain {
+                truth.certain_before = truth.certain_before.min(candidate.t + candidate.error);
+            }
+            truth.certain_before
+        });
+        truth
+    }
+
+    /// Calls `found` with all candidates that begin before the limit that it returns.
+    pub fn each_candidate(&self, ray: &Ray, mut found: impl FnMut(&Candidate) -> f64) {
+        if !self.is_ray(ray) {
+            return;
+        }
+        let mut limit = f64::from(ray.t_far);
+        let world = Placement::World.walker(ray);
+        self.top.walk(&world, widened(limit), |instance, _| {
+            let placement = &self.placements[instance as usize];
+            let Some(local) = placement.ray(ray) else { return widened(limit) };
+            let tree = &self.trees[self.scene.instances[instance as usize].mesh as usize];
+            tree.walk(&local.walker(), widened(limit), |triangle, _| {
+                if let Some(candidate) = self.test_local(ray, &local, instance, triangle) {
+                    limit = limit.min(found(&candidate));
+                }
+                widened(limit)
+            });
+            widened(limit)
+        });
+    }
+
+    /// Whether a nearest hit may be reported.
+    pub fn admits_nearest(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
+        let Some(hit) = hit else { return truth.certain_before == f64::INFINITY };
+        let t = f64::from(hit.t);
+        let inside = hit.t >= ray.t_near.max(0.0) && hit.t <= ray.t_far;
+        inside
+            && t <= truth.certain_before
+            && self.test(ray, hit.instance, hit.triangle).is_some_and(|candidate| candidate.admits(t))
+    }
+
+    /// Whether an occlusion query may answer so.
+    pub fn admits_occlusion(truth: &Truth, occluded: bool) -> bool {
+        if occluded { truth.any_possible } else { truth.certain_before == f64::INFINITY }
+    }
+}
+
+/// Boxes are looked at a little beyond the end of the interval.
+fn widened(limit: f64) -> f64 {
+    limit * (1.0 + 1e-5)
+}
+
+/// A ray in an instance's space.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalRay {
+    /// Origin.
+    pub origin: DVec3,
+    /// Direction.
+    pub direction: DVec3,
+    /// By how much an origin in single precision may be off.
+    pub origin_error: f64,
+    /// The same for the direction.
+    pub direction_error: f64,
+}
+
+impl LocalRay {
+    /// For walks through boxes.
+    pub fn walker(&self) -> Walker {
+        // At a distance r the ray has turned aside by r · Δd / |d|.
+        let turn = self.direction_error / self.direction.length();
+        Walker {
+            origin: self.origin,
+            direction: self.direction,
+            relative: BOUND + turn,
+            absolute: self.origin_error,
+        }
+    }
+}
+
+/// A ray and a triangle that can't be told to miss each other.
+struct Crossing {
+    t: f64,
+    error: f64,
+    /// Whether the ray passes so far inside all edges that there is no doubt.
+    certain: bool,
+    in_plane: bool,
+    u: f64,
+    v: f64,
+    /// By how much u and v may be off.
+    weight_error: f64,
+}
+
+impl Crossing {
+    /// `corners` are relative to the ray's origin.
+    fn new(ray: &LocalRay, corners: [DVec3; 3]) -> Option<Self> {
+        let length = ray.direction.length();
+        let along = ray.direction / length;
+        let reach = corners.iter().map(|corner| corner.length()).fold(0.0, f64::max);
+        // δ: how far a corner seems moved.
+        let moved = BOUND * reach + ray.origin_error + ray.direction_error / length * reach;
+        let across = along.any_orthonormal_pair();
+        let flat = corners.map(|corner| [corner.dot(across.0), corner.dot(across.1)]);
+        let [a, b, c] = corners;
+        let sides = [(1, 2), (2, 0), (0, 1)];
+        let lengths = sides.map(|(p, q)| (corners[q] - corners[p]).length());
+        let longest = lengths.into_iter().fold(0.0, f64::max);
+        let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
+        let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
+        let distances = flat.map(|[x, y]| x.hypot(y));
+        // Boxes keep ray tracers from triangles that are nowhere near.
+        if distances.into_iter().fold(f64::INFINITY, f64::min) > longest + 4.0 * moved {
+            return None;
+        }
+        let doubts: [f64; 3] = std::array::from_fn(|i| {
+            let (p, q) = sides[i];
+            // A moved corner turns its edge about the other one.
+            let widened = moved * (lengths[i] + distances[p] + distances[q]);
+            if overflow { f64::INFINITY } else { widened + UNDERFLOW / length.min(1.0) }
+        });
+        let sign = |i: usize| {
+            if edges[i] > doubts[i] {
+                1
+            } else if edges[i] < -doubts[i] {
+                -1
+            } else {
+                0
+            }
+        };
+        let signs = [sign(0), sign(1), sign(2)];
+        if signs.contains(&1) && signs.contains(&-1) {
+            return None;
+        }
+        let inside = signs == [1; 3] || signs == [-1; 3];
+
+        let normal = (b - a).cross(c - a);
+        let area = normal.length();
+        let cosine = (normal.dot(along) / area).abs();
+        // By how much the normal seems turned: by its own rounding, and by the corners'.
+        let tilt = BOUND * longest * longest / area;
+        let turned = BOUND + tilt + moved * longest / area;
+        // NaN, of a triangle without area, is parallel to everything.
+        let crosses = cosine > 2.0 * turned;
+        let parallel = !crosses || overflow || area * length < UNDERFLOW / BOUND;
+        // Whatever becomes of the division, a hit is about where the triangle is.
+        let depths = corners.map(|corner| corner.dot(along) / length);
+        let (nearest, farthest) =
+            (depths[0].min(depths[1]).min(depths[2]), depths[0].max(depths[1]).max(depths[2]));
+        let rough = 0.5 * (farthest - nearest) + (moved + longest) / length;
+        let (t, error) = if overflow {
+            (0.0, f64::INFINITY)
+        } else if parallel {
+            (0.5 * (nearest + farthest), rough)
+        } else {
+            (
+                a.dot(normal) / ray.direction.dot(normal),
+                (moved + tilt * longest) / (length * (cosine - turned)),
+            )
+        };
+        let weight_error = if parallel { 1.0 } else { turned / (cosine - turned) };
+        let total = edges[0] + edges[1] + edges[2];
+        // Of a triangle that is seen edge-on it is no number.
+        let weight = |part: f64| if part.is_finite() { part } else { 1.0 / 3.0 };
+        Some(Self {
+            t,
+            error,
+            certain: inside && !parallel,
+            in_plane: parallel,
+            u: weight(edges[1] / total),
+            v: weight(edges[2] / total),
+            weight_error: weight_error.min(1.0),
+        })
+    }
+
+    /// Barycentric coordinates all around the hit, within the doubt and the triangle.
+    fn surroundings(&self) -> [(f32, f32); 9] {
+        let e = self.weight_error;
+        let mut around = [(0.0, 0.0); 9];
+        for (slot, (i, j)) in around.iter_mut().zip((-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)))) {
+            let u = (self.u + f64::from(i) * e).clamp(0.0, 1.0);
+            let v = (self.v + f64::from(j) * e).clamp(0.0, 1.0 - u);
+            *slot = (u as f32, v as f32);
+        }
+        around
+    }
+}

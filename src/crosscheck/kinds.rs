@@ -1,0 +1,318 @@
+//! The rays that are asked about: those of rendering, and those that break ray tracers.
+
+use glam::{Vec2, Vec3};
+
+use super::queries::Ask;
+use crate::accel::Ray;
+use crate::light_mesh::LightTable;
+use crate::render::CameraRays;
+use crate::scene::random::SplitMix64;
+use crate::scene::{Bounds, Camera, PointLight, Scene, SurfacePoint};
+
+macro_rules! kinds {
+    ($($kind:ident $name:literal $what:literal,)*) => {
+        /// Kinds of rays.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Kind { $(#[doc = $what] $kind,)* }
+
+        impl Kind {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$kind,)*];
+
+            /// Name in tables.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$kind => $name,)* }
+            }
+        }
+    };
+}
+
+kinds! {
+    Camera "camera" "Camera rays through neighbouring pixels.",
+    Occlusion "occlusion" "From surface points and mesh points to the lights.",
+    Mirror "mirror" "Reflections at surface points.",
+    Sphere "sphere" "From mesh points in all directions.",
+    Vertex "vertex" "Through vertices.",
+    Edge "edge" "Through points of edges.",
+    AlongEdge "along-edge" "Along edges, from before or within them.",
+    InPlane "in-plane" "In the planes of triangles.",
+    Axis "axis" "Parallel to an axis, many through vertices.",
+    Zeros "zeros" "With direction components that are 0 or −0.",
+    Denormal "denormal" "With direction components that are denormal or next to it.",
+    Far "far" "From up to a thousand times the scene's size away.",
+    Surface "surface" "Starting or ending on triangles.",
+    Mixed "mixed" "All the others in one packet.",
+}
+
+/// Side of the squares of pixels that camera rays go through.
+const SQUARE: u32 = 64;
+
+/// Resolution of the pictures that camera rays are taken from.
+const RESOLUTION: (u32, u32) = (1024, 768);
+
+/// Camera rays per pixel to choose from.
+const SAMPLES: u32 = 16;
+
+/// Makes rays for a scene.
+pub struct RaySource<'a> {
+    scene: &'a Scene,
+    cameras: Vec<CameraRays>,
+    lights: LightTable,
+    bounds: Bounds,
+    /// Triangles up to and with each instance.
+    triangles: Vec<u64>,
+    /// Finds the surface points.
+    tracer: &'a dyn Ask,
+    seed: u64,
+}
+
+impl<'a> RaySource<'a> {
+    /// A scene without lights gets a few in its corners.
+    pub fn new(scene: &'a Scene, cameras: &[Camera], tracer: &'a dyn Ask, seed: u64) -> Self {
+        let mut bounds = scene.bounds();
+        if bounds.is_empty() {
+            bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        }
+        let mut triangles = Vec::with_capacity(scene.instances.len());
+        let mut total = 0u64;
+        for instance in &scene.instances {
+            total += scene.meshes.get(instance.mesh as usize).map_or(0, |mesh| mesh.triangles.len() as u64);
+            triangles.push(total);
+        }
+        let lights = if scene.lights.is_empty() {
+            let mut random = SplitMix64::new(seed);
+            let lights: Vec<_> =
+                (0..20).map(|_| PointLight::new(random.in_box(bounds.min, bounds.max), Vec3::ONE)).collect();
+            LightTable::of_scene(&Scene { lights, ..Scene::default() })
+        } else {
+            LightTable::of_scene(scene)
+        };
+        let cameras = cameras.iter().map(|camera| CameraRays::new(camera, RESOLUTION, SAMPLES)).collect();
+        Self { scene, cameras, lights, bounds, triangles, tracer, seed }
+    }
+
+    /// The rays of block `index`, which depend on the seed and it alone.
+    pub fn block(&self, index: u64, count: usize) -> (Kind, Vec<Ray>) {
+        let kind = Kind::ALL[(index % Kind::ALL.len() as u64) as usize];
+        // Blocks that follow each other must not draw from one sequence.
+        let mut random = SplitMix64::new(self.seed ^ SplitMix64::new(index).next());
+        let mut rays = Vec::with_capacity(count);
+        while rays.len() < count {
+            self.some(kind, count, &mut random, &mut rays);
+        }
+        rays.truncate(count);
+        (kind, rays)
+    }
+
+    fn some(&self, kind: Kind, count: usize, random: &mut SplitMix64, rays: &mut Vec<Ray>) {
+        match kind {
+            Kind::Camera => self.camera(random, rays),
+            Kind::Occlusion => self.occlusion(random, rays),
+            Kind::Mirror => {
+                let (seen, surface) = self.surface(random);
+                rays.push(Ray::new(surface.ray_origin(), seen.reflect(surface.shading_normal)));
+            }
+            Kind::Sphere => {
+                let origin = self.anywhere(random);
+                rays.extend((0..16).map(|_| Ray::new(origin, direction(random))));
+            }
+            Kind::Mixed => {
+                for _ in 0..count {
+                    let kinds = &Kind::ALL[1..Kind::ALL.len() - 1];
+                    let kind = kinds[random.next() as usize % kinds.len()];
+                    let start = rays.len();
+                    self.some(kind, count, random, rays);
+                    rays.truncate(start + 1);
+                }
+            }
+            _ => {
+                let corners = self.triangle(random);
+                rays.push(self.at_triangle(kind, corners, random));
+            }
+        }
+    }
+
+    fn camera(&self, random: &mut SplitMix64, rays: &mut Vec<Ray>) {
+        let Some(camera) = self.cameras.get(random.next() as usize % self.cameras.len().max(1)) else {
+            let origin = self.anywhere(random);
+            return rays.push(Ray::new(origin, direction(random)));
+        };
+        let x = random.next() as u32 % (RESOLUTION.0 - SQUARE);
+        let y = random.next() as u32 % (RESOLUTION.1 - SQUARE);
+        let sample = random.next() as u32 % SAMPLES;
+        // Four by four pixels after each other, as the renderer takes them.
+        for square in 0..SQUARE * SQUARE / 16 {
+            let (left, top) = (square % (SQUARE / 4) * 4, square / (SQUARE / 4) * 4);
+            rays.extend((0..16).map(|i| camera.ray(x + left + i % 4, y + top + i / 4, sample)));
+        }
+    }
+
+    /// From one point to all lights, or from neighbouring points to one light after the other.
+    fn occlusion(&self, random: &mut SplitMix64, rays: &mut Vec<Ray>) {
+        let points: Vec<Vec3> = if random.next() & 1 == 0 {
+            vec![self.surface(random).1.ray_origin()]
+        } else {
+            let corner = self.anywhere(random);
+            let spacing = 0.01 * self.bounds.extent().max_element();
+            (0..16).map(|i| corner + spacing * Vec3::new((i % 4) as f32, 0.0, (i / 4) as f32)).collect()
+        };
+        for chunk in self.lights.chunks() {
+            for light in (0..crate::light_mesh::LANES).filter(|&light| chunk.used >> light & 1 != 0) {
+                rays.extend(points.iter().map(|&point| {
+                    let way = Vec3::from_array(chunk.way_from(light, point.to_array()));
+                    Ray { t_far: 1.0, ..Ray::new(point, way) }
+                }));
+            }
+        }
+        if self.lights.is_empty() {
+            rays.push(Ray::between(points[0], self.anywhere(random)));
+        }
+    }
+
+    /// A point that a camera sees, or one on any triangle, with the direction that it is seen along.
+    fn surface(&self, random: &mut SplitMix64) -> (Vec3, SurfacePoint) {
+        for _ in 0..4 {
+            let ray = match self.cameras.get(random.next() as usize % self.cameras.len().max(1)) {
+                Some(camera) => camera.ray(
+                    random.next() as u32 % RESOLUTION.0,
+                    random.next() as u32 % RESOLUTION.1,
+                    random.next() as u32 % SAMPLES,
+                ),
+                None => Ray::new(self.anywhere(random), direction(random)),
+            };
+            if let Some(hit) = self.tracer.nearest(&ray) {
+                return (ray.direction, self.scene.surface_point(&hit, ray.direction));
+            }
+        }
+        // Nothing is seen: a point in the air does as well.
+        let normal = direction(random);
+        let point = SurfacePoint {
+            position: self.anywhere(random),
+            offset: 0.0,
+            geometric_normal: normal,
+            shading_normal: normal,
+            diffuse: Vec3::ZERO,
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            front: true,
+            two_sided: true,
+            culled: false,
+        };
+        (-normal, point)
+    }
+
+    fn at_triangle(&self, kind: Kind, corners: [Vec3; 3], random: &mut SplitMix64) -> Ray {
+        let first = random.next() as usize % 3;
+        let [a, b, c] = [0, 1, 2].map(|i| corners[(first + i) % 3]);
+        let (on_edge, inside) = (a.lerp(b, random.unit()), inside(corners, random));
+        let origin = self.origin(a, random);
+        let aimed = |from: Vec3, at: Vec3, random: &mut SplitMix64| match random.next() % 3 {
+            0 => Ray::between(from, at),
+            1 => Ray::new(from, at - from),
+            // Beyond what it is aimed at.
+            _ => Ray::between(from, from + 2.0 * (at - from)),
+        };
+        let mut axis = Vec3::ZERO;
+        axis[random.next() as usize % 3] = if random.next() & 1 == 0 { 1.0 } else { -1.0 };
+        match kind {
+            Kind::Vertex => aimed(origin, a, random),
+            Kind::Edge => aimed(origin, on_edge, random),
+            Kind::AlongEdge => {
+                let start = [a, on_edge, a - (b - a)][random.next() as usize % 3];
+                aimed(start, b, random)
+            }
+            Kind::InPlane => {
+                let weights = Vec2::new(random.between(-3.0, 3.0), random.between(-3.0, 3.0));
+                let start = a + weights.x * (b - a) + weights.y * (c - a);
+                let target = [a, b, on_edge, inside][random.next() as usize % 4];
+                aimed(start, target, random)
+            }
+            Kind::Axis => {
+                let target = [a, on_edge, inside, origin][random.next() as usize % 4];
+                let size = self.bounds.extent().max_element();
+                let length = [1.0, size, random.unit() * size][random.next() as usize % 3];
+                Ray::new(target - random.unit() * size * axis, length * axis)
+            }
+            Kind::Zeros => {
+                let mut way = inside - origin;
+                way[random.next() as usize % 3] = if random.next() & 1 == 0 { 0.0 } else { -0.0 };
+                Ray::new(if random.next() & 1 == 0 { inside - way } else { origin }, way)
+            }
+            Kind::Denormal => {
+                let mut way = inside - origin;
+                let tiny = [1e-45, 1e-40, -1e-39, 1e-38, -1e-30, 1e-25, 1e-19, -1e-18, 1e-17, 1e-12];
+                for _ in 0..1 + random.next() % 2 {
+                    way[random.next() as usize % 3] = tiny[random.next() as usize % tiny.len()];
+                }
+                Ray::new(if random.next() & 1 == 0 { inside - way } else { origin }, way)
+            }
+            Kind::Far => {
+                let size = self.bounds.extent().max_element().max(f32::MIN_POSITIVE);
+                let far = inside + size * 10f32.powf(random.between(0.0, 3.0)) * direction(random);
+                aimed(far, [inside, inside, on_edge, a][random.next() as usize % 4], random)
+            }
+            _ => {
+                let start = [a, on_edge, inside, inside][random.next() as usize % 4];
+                match random.next() % 3 {
+                    0 => Ray::new(start, direction(random)),
+                    1 => Ray::between(start, self.anywhere(random)),
+                    _ => Ray::between(self.anywhere(random), start),
+                }
+            }
+        }
+    }
+
+    /// Somewhere to start from: in the scene's box, or near the triangle.
+    fn origin(&self, near: Vec3, random: &mut SplitMix64) -> Vec3 {
+        match random.next() % 3 {
+            0 => near + random.unit() * 0.01 * self.bounds.extent().max_element() * direction(random),
+            _ => self.anywhere(random),
+        }
+    }
+
+    fn anywhere(&self, random: &mut SplitMix64) -> Vec3 {
+        random.in_box(self.bounds.min, self.bounds.max)
+    }
+
+    /// The corners of a triangle in world space: of any instance, or of any triangle, in turn.
+    fn triangle(&self, random: &mut SplitMix64) -> [Vec3; 3] {
+        let total = self.triangles.last().copied().unwrap_or(0);
+        if total == 0 {
+            return [self.anywhere(random), self.anywhere(random), self.anywhere(random)];
+        }
+        let drawn = random.next() % total;
+        let mut number = self.triangles.partition_point(|&up_to| up_to <= drawn);
+        if random.next() & 1 == 0 {
+            number = random.next() as usize % self.triangles.len();
+        }
+        let instance = &self.scene.instances[number];
+        let mesh = &self.scene.meshes[instance.mesh as usize];
+        if mesh.triangles.is_empty() {
+            return self.triangle(random);
+        }
+        let corners = mesh.corners((random.next() % mesh.triangles.len() as u64) as u32);
+        match &instance.to_world {
+            Some(to_world) => corners.map(|corner| to_world.transform_point3(corner)),
+            None => corners,
+        }
+    }
+}
+
+/// Uniform on the unit sphere.
+fn direction(random: &mut SplitMix64) -> Vec3 {
+    loop {
+        let way = random.in_box(Vec3::NEG_ONE, Vec3::ONE);
+        let length = way.length();
+        if length > 1e-3 && length <= 1.0 {
+            return way / length;
+        }
+    }
+}
+
+fn inside([a, b, c]: [Vec3; 3], random: &mut SplitMix64) -> Vec3 {
+    let (mut u, mut v) = (random.unit(), random.unit());
+    if u + v > 1.0 {
+        (u, v) = (1.0 - u, 1.0 - v);
+    }
+    a + u * (b - a) + v * (c - a)
+}

@@ -1,0 +1,231 @@
+//! Ray tracers that prove each other: the same rays to every backend, in every form of query, and a judge in double
+//! precision for what they disagree about.
+//!
+//! What is checked and how it is judged is written down in docs/crosscheck.md.
+
+mod boxes;
+mod judge;
+mod kinds;
+mod placement;
+mod queries;
+mod ray_text;
+mod replay;
+mod report;
+mod watertight;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+pub use judge::{BOUND, Candidate, Judge, Truth};
+pub use kinds::{Kind, RaySource};
+pub use queries::{Answer, Ask, Query, packets};
+pub use ray_text::{RayTextError, from_text, to_text};
+pub use replay::{Replay, replay};
+pub use report::{Class, Counts, KindCounts, Report, Unexplained};
+pub use watertight::{Escapes, Watertightness, watertightness};
+
+use crate::accel::{Hit, Ray};
+use crate::scene::{Camera, Scene};
+
+/// Rays that are made and asked about together, all of one kind.
+const BLOCK: u64 = 4096;
+
+/// Of the rays that all agree about, one in so many is judged nevertheless.
+const AUDIT: usize = 16;
+
+/// Unexplained disagreements that are kept, of each block and in all.
+const KEPT: usize = 20;
+
+/// Distances that differ by less are equal without a judge: two roundings.
+const NEGLIGIBLE: f32 = 2.0 * f32::EPSILON;
+
+/// A backend under test.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// Name in tables.
+    pub name: &'a str,
+    /// The backend.
+    pub accel: &'a dyn Ask,
+}
+
+/// How much is checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Rays, shared out evenly between the kinds.
+    pub rays: u64,
+    /// What the rays follow from, with the scene.
+    pub seed: u64,
+}
+
+/// Asks all subjects about rays of all kinds, in all forms of query, on rayon's threads.
+///
+/// The first subject's nearest hits of single rays are what all answers are compared with. The report depends on
+/// scene and options alone. `progress` hears of every block, with the number of rays in it.
+pub fn crosscheck(
+    scene: &Scene,
+    cameras: &[Camera],
+    subjects: &[Subject],
+    options: &Options,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Report {
+    let names = subjects.iter().map(|subject| subject.name.to_owned()).collect();
+    let mut report = Report::new(names, options);
+    let Some(first) = subjects.first() else { return report };
+    let judge = Judge::new(scene);
+    let source = RaySource::new(scene, cameras, first.accel, options.seed);
+    let blocks: Vec<_> = (0..options.rays.div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let count = BLOCK.min(options.rays - block * BLOCK);
+            let (kind, rays) = source.block(block, count as usize);
+            let result = check_rays(&judge, subjects, &rays);
+            progress(count);
+            (kind, result)
+        })
+        .collect();
+    for (kind, block) in blocks {
+        report.add(kind, block);
+    }
+    report
+}
+
+/// What came of some rays.
+#[derive(Clone, Debug, Default)]
+pub struct Checked {
+    /// How many rays there were.
+    pub rays: u64,
+    /// Rays judged without a disagreement.
+    pub audited: u64,
+    /// Largest difference of distances over what the bound allows, among hits of one triangle that were judged.
+    pub worst: f64,
+    /// By subject.
+    pub counts: Vec<Counts>,
+    /// The first disagreements that nothing explains.
+    pub unexplained: Vec<Unexplained>,
+}
+
+/// An answer that differs from the reference's.
+struct Disagreement {
+    subject: usize,
+    query: Query,
+    answer: Option<Answer>,
+}
+
+/// Asks all subjects about some rays and judges what they disagree about.
+pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked {
+    let mut checked = Checked {
+        rays: rays.len() as u64,
+        counts: vec![Counts::default(); subjects.len()],
+        ..Checked::default()
+    };
+    let Some(first) = subjects.first() else { return checked };
+    let reference: Vec<_> = rays.iter().map(|ray| first.accel.nearest(ray)).collect();
+    let mut disagreements: BTreeMap<usize, Vec<Disagreement>> = BTreeMap::new();
+    for (number, subject) in subjects.iter().enumerate() {
+        for query in Query::all() {
+            let answers = subject.accel.ask(query, rays);
+            for (ray, (answer, reference)) in answers.answers.iter().zip(&reference).enumerate() {
+                if !equal(answer, reference.as_ref()) {
+                    let found = Disagreement { subject: number, query, answer: Some(*answer) };
+                    disagreements.entry(ray).or_default().push(found);
+                }
+            }
+            for ray in answers.strays {
+                let found = Disagreement { subject: number, query, answer: None };
+                disagreements.entry(ray).or_default().push(found);
+            }
+        }
+    }
+
+    let mut classes = vec![Class::Agree; subjects.len()];
+    for (index, (ray, reference)) in rays.iter().zip(&reference).enumerate() {
+        let found = disagreements.get(&index).map_or(&[][..], Vec::as_slice);
+        if found.is_empty() && index % AUDIT != 0 {
+            checked.counts.iter_mut().for_each(|counts| counts.add(Class::Agree));
+            continue;
+        }
+        checked.audited += u64::from(found.is_empty());
+        let truth = judge.truth(ray);
+        classes.fill(Class::Agree);
+        let mut complain = |subject: usize, query: Query, answer: Option<Answer>| {
+            if checked.unexplained.len() < KEPT {
+                let (start, packet, _) = packets(query.width, rays)
+                    .find(|(start, packet, _)| (*start..*start + packet.len()).contains(&index))
+                    .unwrap_or((0, rays, crate::accel::Coherence::Coherent));
+                checked.unexplained.push(Unexplained {
+                    backend: subjects[subject].name.to_owned(),
+                    query,
+                    answer,
+                    reference: *reference,
+                    truth,
+                    ray: *ray,
+                    packet: packet.to_vec(),
+                    lane: index - start,
+                });
+            }
+        };
+        if !judge.admits_nearest(ray, &truth, reference.as_ref()) {
+            classes[0] = Class::Unexplained;
+            let query = Query { occlusion: false, width: 1 };
+            complain(0, query, Some(Answer::Nearest(*reference)));
+        }
+        for Disagreement { subject, query, answer } in found {
+            let class = match answer {
+                Some(answer) if admits(judge, ray, &truth, answer) => {
+                    explained(judge, ray, answer, reference.as_ref(), &mut checked.worst)
+                }
+                _ => {
+                    // The first query that fails tells enough.
+                    if classes[*subject] != Class::Unexplained {
+                        complain(*subject, *query, *answer);
+                    }
+                    Class::Unexplained
+                }
+            };
+            classes[*subject] = classes[*subject].max(class);
+        }
+        checked.counts.iter_mut().zip(&classes).for_each(|(counts, class)| counts.add(*class));
+    }
+    checked
+}
+
+/// Whether an answer is the reference's, as far as single precision can tell.
+fn equal(answer: &Answer, reference: Option<&Hit>) -> bool {
+    match (answer, reference) {
+        (Answer::Nearest(Some(a)), Some(b)) => {
+            let same = (a.instance, a.triangle) == (b.instance, b.triangle);
+            same && (a.t - b.t).abs() <= NEGLIGIBLE * a.t.abs()
+        }
+        (answer, reference) => answer.is_hit() == reference.is_some(),
+    }
+}
+
+fn admits(judge: &Judge, ray: &Ray, truth: &Truth, answer: &Answer) -> bool {
+    match answer {
+        Answer::Nearest(hit) => judge.admits_nearest(ray, truth, hit.as_ref()),
+        Answer::Occluded(occluded) => Judge::admits_occlusion(truth, *occluded),
+    }
+}
+
+/// What kind of difference it is that has an explanation.
+fn explained(judge: &Judge, ray: &Ray, answer: &Answer, reference: Option<&Hit>, worst: &mut f64) -> Class {
+    let candidate = |hit: &Hit| judge.test(ray, hit.instance, hit.triangle);
+    let Answer::Nearest(Some(a)) = answer else { return Class::Graze };
+    let Some(first) = candidate(a) else { return Class::Graze };
+    if !first.is_near(f64::from(a.t)) {
+        return Class::InPlane;
+    }
+    let Some((b, second)) = reference.and_then(|b| Some((b, candidate(b)?))) else { return Class::Graze };
+    if !second.is_near(f64::from(b.t)) {
+        return Class::InPlane;
+    }
+    if (a.instance, a.triangle) == (b.instance, b.triangle) {
+        let off = (f64::from(a.t) - first.t).abs().max((f64::from(b.t) - first.t).abs());
+        if !first.in_plane {
+            *worst = worst.max(off / first.error);
+        }
+        return Class::Agree;
+    }
+    if (first.t - second.t).abs() <= first.error + second.error { Class::Tie } else { Class::Graze }
+}

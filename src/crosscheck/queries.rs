@@ -1,0 +1,142 @@
+//! The queries of a backend, and how they are asked.
+
+use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
+
+/// Rays per packet; 1 for single rays.
+pub const WIDTHS: [usize; 4] = [1, 4, 8, 16];
+
+/// One way to ask a backend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Query {
+    /// Whether anything is on the ray, or else what comes first.
+    pub occlusion: bool,
+    /// One of [`WIDTHS`].
+    pub width: usize,
+}
+
+impl Query {
+    /// All ways.
+    pub fn all() -> impl Iterator<Item = Self> {
+        [false, true].into_iter().flat_map(|occlusion| WIDTHS.map(|width| Self { occlusion, width }))
+    }
+}
+
+impl std::fmt::Display for Query {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let what = if self.occlusion { "occlusion" } else { "nearest hit" };
+        match self.width {
+            1 => write!(f, "{what}, single ray"),
+            width => write!(f, "{what}, packet of {width}"),
+        }
+    }
+}
+
+/// What a backend says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// Of a nearest-hit query.
+    Nearest(Option<Hit>),
+    /// Of an occlusion query.
+    Occluded(bool),
+}
+
+impl Answer {
+    /// Whether it speaks of a hit.
+    pub fn is_hit(&self) -> bool {
+        match self {
+            Self::Nearest(hit) => hit.is_some(),
+            Self::Occluded(occluded) => *occluded,
+        }
+    }
+}
+
+/// The answers to a list of rays.
+#[derive(Default)]
+pub struct Answers {
+    /// In the order of the rays.
+    pub answers: Vec<Answer>,
+    /// First rays of packets in which a lane answered that was switched off.
+    pub strays: Vec<usize>,
+}
+
+/// An [`Accel`] whose type is forgotten.
+pub trait Ask: Send + Sync {
+    /// Asks about all rays.
+    fn ask(&self, query: Query, rays: &[Ray]) -> Answers;
+    /// The nearest hit of one ray.
+    fn nearest(&self, ray: &Ray) -> Option<Hit>;
+}
+
+impl<A: Accel> Ask for A {
+    fn ask(&self, query: Query, rays: &[Ray]) -> Answers {
+        match (query.occlusion, query.width) {
+            (false, 4) => nearest::<A, 4>(self, rays),
+            (false, 8) => nearest::<A, 8>(self, rays),
+            (false, 16) => nearest::<A, 16>(self, rays),
+            (true, 4) => occlusion::<A, 4>(self, rays),
+            (true, 8) => occlusion::<A, 8>(self, rays),
+            (true, 16) => occlusion::<A, 16>(self, rays),
+            (false, _) => {
+                let answers = rays.iter().map(|ray| Answer::Nearest(self.intersect(ray)));
+                Answers { answers: answers.collect(), strays: Vec::new() }
+            }
+            (true, _) => {
+                let answers = rays.iter().map(|ray| Answer::Occluded(self.occluded(ray)));
+                Answers { answers: answers.collect(), strays: Vec::new() }
+            }
+        }
+    }
+
+    fn nearest(&self, ray: &Ray) -> Option<Hit> {
+        self.intersect(ray)
+    }
+}
+
+/// Cuts rays into packets of `width`, every eighth of them partly filled as the last ones of a list are, with
+/// either hint of coherence in turn.
+pub fn packets(width: usize, rays: &[Ray]) -> impl Iterator<Item = (usize, &[Ray], Coherence)> {
+    let (mut first, mut number) = (0, 0);
+    std::iter::from_fn(move || {
+        let wanted = if number % 8 == 7 { 1 + (number / 8) % width } else { width };
+        let coherence = if number % 2 == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+        number += 1;
+        let packet = rays.get(first..(first + wanted).min(rays.len())).filter(|rays| !rays.is_empty())?;
+        let start = first;
+        first += packet.len();
+        Some((start, packet, coherence))
+    })
+}
+
+/// Lanes in use, of a packet that holds a first few rays. The lanes behind them repeat the first, so that one that
+/// is traced by mistake has something to hit.
+fn active(rays: &[Ray]) -> LaneMask {
+    (1 << rays.len()) - 1
+}
+
+fn nearest<A: Accel, const N: usize>(accel: &A, rays: &[Ray]) -> Answers {
+    let mut answers = Answers { answers: Vec::with_capacity(rays.len()), strays: Vec::new() };
+    for (first, rays, coherence) in packets(N, rays) {
+        let mut packet = RayHitPacket::<N>::empty();
+        (0..N).for_each(|lane| packet.set_lane(lane, rays.get(lane).unwrap_or(&rays[0])));
+        accel.intersect_packet(active(rays), &mut packet, coherence);
+        answers.answers.extend((0..rays.len()).map(|lane| Answer::Nearest(hit_of_lane(&packet, lane))));
+        if (rays.len()..N).any(|lane| hit_of_lane(&packet, lane).is_some()) {
+            answers.strays.push(first);
+        }
+    }
+    answers
+}
+
+fn occlusion<A: Accel, const N: usize>(accel: &A, rays: &[Ray]) -> Answers {
+    let mut answers = Answers { answers: Vec::with_capacity(rays.len()), strays: Vec::new() };
+    for (first, rays, coherence) in packets(N, rays) {
+        let mut packet = RayPacket::<N>::empty();
+        (0..N).for_each(|lane| packet.set_lane(lane, rays.get(lane).unwrap_or(&rays[0])));
+        let blocked = accel.occluded_packet(active(rays), &mut packet, coherence);
+        answers.answers.extend((0..rays.len()).map(|lane| Answer::Occluded(blocked >> lane & 1 != 0)));
+        if blocked & !active(rays) != 0 {
+            answers.strays.push(first);
+        }
+    }
+    answers
+}
