@@ -5,6 +5,7 @@
 pub mod accel;
 pub mod bench;
 pub mod cli;
+pub mod framing;
 pub mod image;
 pub mod light_mesh;
 pub mod render;
