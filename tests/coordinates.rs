@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::ops::Range;
+
 use common::{Builder, camera, grey, light};
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
@@ -40,13 +42,13 @@ fn backends(scene: &Scene) -> Vec<Backend> {
 }
 
 /// The largest relative difference at pixels around which, `margin` pixels wide, the reference has no edge: no value that
-/// is off by more than a quarter from the middle's. There is one light, so that shadows are black: among those pixels are
+/// is off by more than a quarter from the middle's, within some rows. There is one light, so that shadows are black: among those pixels are
 /// black ones, where any light counts as a difference of 1. Also how many such pixels there are, lit and black.
-fn largest_difference(film: &Film, reference: &Film, margin: u32) -> (f32, [usize; 2]) {
-    let (width, height) = reference.resolution;
+fn largest_difference(film: &Film, reference: &Film, margin: u32, rows: Range<u32>) -> (f32, [usize; 2]) {
+    let (width, _) = reference.resolution;
     let at = |film: &Film, x: u32, y: u32| film.pixels[(y * width + x) as usize][0];
     let (mut largest, mut count) = (0.0f32, [0; 2]);
-    for (x, y) in (margin..height - margin).flat_map(|y| (margin..width - margin).map(move |x| (x, y))) {
+    for (x, y) in rows.flat_map(|y| (margin..width - margin).map(move |x| (x, y))) {
         let middle = at(reference, x, y);
         let mut around =
             (y - margin..=y + margin).flat_map(|y| (x - margin..=x + margin).map(move |x| (x, y)));
@@ -78,8 +80,8 @@ fn a_scene_far_from_the_origin_looks_as_it_does_there() {
                 let (scene, camera) = yard(Vec3::new(distance, 0.5 * distance, -distance), 64.0);
                 let backend = &backends(&scene)[number];
                 let far = render(backend, &scene, &camera, &settings, &()).unwrap().0;
-                let (difference, count) = largest_difference(&far, &reference, 2);
-                assert!(count[0] > 1500 && count[1] > 100, "only {count:?} pixels are away from edges");
+                let (difference, count) = largest_difference(&far, &reference, 2, 2..RESOLUTION.1 - 2);
+                assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
                 let allowed = 2.0 * 32.0 * f32::EPSILON * distance / 25.0 + 1e-3;
                 let name = backend.name();
                 assert!(
@@ -93,18 +95,19 @@ fn a_scene_far_from_the_origin_looks_as_it_does_there() {
 
 /// A floor of 4,300 units under blocks of 6 to 12 units: the offset of rays grows with the floor's triangles to
 /// 32 ε · (64 + 4,300) = 0.02 units, a thirtieth of a pixel. The picture is that with a small floor, up to single pixels
-/// on edges.
+/// on edges; the upper third, in which the small floor ends, is left out.
 #[test]
 fn details_of_a_huge_scene_look_as_in_a_small_one() {
     let settings =
         Settings { resolution: RESOLUTION, integrator: Integrator::Conventional, ..Settings::default() };
-    let (small, camera) = yard(Vec3::ZERO, 128.0);
+    let (small, camera) = yard(Vec3::ZERO, 256.0);
     let (huge, _) = yard(Vec3::ZERO, 4300.0);
     for (of_small, of_huge) in backends(&small).iter().zip(&backends(&huge)) {
         let reference = render(of_small, &small, &camera, &settings, &()).unwrap().0;
         let film = render(of_huge, &huge, &camera, &settings, &()).unwrap().0;
-        let (difference, count) = largest_difference(&film, &reference, 1);
-        assert!(count[0] > 1500 && count[1] > 100, "only {count:?} pixels are away from edges");
+        let (difference, count) =
+            largest_difference(&film, &reference, 1, RESOLUTION.1 / 3..RESOLUTION.1 - 1);
+        assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
         assert!(difference <= 1e-3, "{}: {difference}", of_huge.name());
     }
 }

@@ -60,13 +60,14 @@ fn share(scene: &Scene, light: &PointLight, y: &SurfacePoint) -> Vec3 {
 /// At half the spacing the bands along shadow edges in which D_y disagrees are half as wide, so that the mean error is
 /// halved too (spec §13: L1 = O(R)) once D_y is smaller than what casts the shadows, and falls more slowly before. Beside a
 /// lamp the inverse square has no bound: values count up to the white of the picture.
-fn errs_only_where_the_spacing_explains_it(model: &str, lights: usize) {
+fn errs_only_where_the_spacing_explains_it(model: &str, lights: usize, coarsest: f32) {
     let Some(loaded) = opened(model) else { return };
     let LoadedScene { scene, cameras, settings, .. } = &loaded;
     assert_eq!(scene.lights.len(), lights);
     let backend = backend(scene);
     let (exact, _) = conventional(scene, &cameras[0], settings);
-    let Spacing::Units(spacing) = settings.light_mesh.points.spacing else { panic!("a spacing is chosen") };
+    let Spacing::Units(chosen) = settings.light_mesh.points.spacing else { panic!("a spacing is chosen") };
+    let spacing = chosen * coarsest;
     let errors = [1.0f32, 0.5, 0.25].map(|part| {
         let mut settings = settings.clone();
         settings.light_mesh.points.spacing = Spacing::Units(spacing * part);
@@ -131,10 +132,12 @@ fn check_bounds(
 
 #[test]
 fn quake_start_with_its_267_lights() {
-    errs_only_where_the_spacing_explains_it("quake_start/quake_start.glb", 267);
+    errs_only_where_the_spacing_explains_it("quake_start/quake_start.glb", 267, 1.0);
 }
 
+/// A quarter of the spacing that is chosen: with D_y of 26 units, wider than street lamps and flowerbeds, nearly every light
+/// is disagreed about somewhere.
 #[test]
 fn candela_city_at_its_street_lamps() {
-    errs_only_where_the_spacing_explains_it("stk_candela_city/candela_city.glb", 72);
+    errs_only_where_the_spacing_explains_it("stk_candela_city/candela_city.glb", 72, 0.25);
 }
