@@ -6,6 +6,7 @@ pub mod accel;
 pub mod bench;
 pub mod cli;
 pub mod crosscheck;
+pub mod framing;
 pub mod image;
 pub mod light_mesh;
 pub mod render;

@@ -18,7 +18,7 @@ use crate::image::{ImageError, OutputFile};
 /// all pictures of the list that are there.
 #[derive(Args, Clone, Debug)]
 pub struct GalleryArgs {
-    /// The list: a TOML file of `[[picture]]` tables with name, title, scene and caption
+    /// The list: a TOML file of `[[picture]]` tables with name, title, scene and caption, and perhaps models that it needs
     #[arg(long, value_name = "FILE", default_value = "scenes/gallery.toml")]
     pub list: PathBuf,
     /// Folder to write into, created if need be
@@ -55,6 +55,16 @@ pub struct Picture {
     pub scene: PathBuf,
     /// What there is to see.
     pub caption: String,
+    /// Models that are not part of the project, relative to the list; where one is missing, the picture is not rendered.
+    #[serde(default)]
+    pub needs: Vec<PathBuf>,
+}
+
+impl Picture {
+    /// The first of the models that it needs and that is not in the list's folder.
+    pub fn missing(&self, folder: &Path) -> Option<PathBuf> {
+        self.needs.iter().map(|model| folder.join(model)).find(|model| !model.exists())
+    }
 }
 
 /// Why there is no gallery.
@@ -150,6 +160,10 @@ pub fn run(args: &GalleryArgs) -> Result<(), GalleryError> {
 
     for picture in &gallery.picture {
         if !args.only.is_empty() && !args.only.contains(&picture.name) {
+            continue;
+        }
+        if let Some(model) = picture.missing(folder) {
+            reporter.line(&format!("{}: skipped, there is no {}", picture.name, model.display()));
             continue;
         }
         reporter.line(&format!("{}:", picture.name));

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::accel::{Backend, BackendChoice, BackendError};
+use crate::framing::complete_view;
 use crate::image::{ImageError, OutputFile};
 use crate::render::render;
 use crate::scene::load::{LoadError, ModelFormat, OpenedScene, auto_exposure, complete, load_model};
@@ -56,8 +57,10 @@ pub fn run(args: &InitArgs) -> Result<(), InitError> {
     let target = OutputFile::new(&args.output)?;
     let model = load_model(&args.model)?;
     let (has_lights, has_cameras) = (!model.lights.is_empty(), !model.cameras.is_empty());
-    let opened = complete(model);
-    let exposure = exposure(&opened)?;
+    let mut opened = complete(model);
+    let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene)?.backend;
+    complete_view(&mut opened, &backend);
+    let exposure = exposure(&opened, &backend);
     let folder = args.output.parent().unwrap_or(Path::new(""));
     let file = relative(&args.model, folder);
     let file = file.to_str().ok_or_else(|| InitError::Name(args.model.clone()))?;
@@ -66,14 +69,13 @@ pub fn run(args: &InitArgs) -> Result<(), InitError> {
 }
 
 /// Exposure by a small picture.
-fn exposure(opened: &OpenedScene) -> Result<f32, InitError> {
+fn exposure(opened: &OpenedScene, backend: &Backend) -> f32 {
     let loaded = &opened.loaded;
-    let backend = Backend::build(BackendChoice::Auto, &loaded.scene)?.backend;
     let settings =
         Settings { resolution: PREVIEW, integrator: Integrator::Conventional, ..loaded.settings.clone() };
-    let Some(camera) = loaded.cameras.first() else { return Ok(0.0) };
-    let film = render(&backend, &loaded.scene, camera, &settings, &());
-    Ok(film.map_or(0.0, |(film, _)| auto_exposure(&film.pixels)))
+    let Some(camera) = loaded.cameras.first() else { return 0.0 };
+    let film = render(backend, &loaded.scene, camera, &settings, &());
+    film.map_or(0.0, |(film, _)| auto_exposure(&film.pixels))
 }
 
 /// The model as the scene file has to name it.
@@ -111,7 +113,7 @@ fn scene_file(
             let names: Vec<&str> = loaded.cameras.iter().map(|camera| camera.name.as_str()).collect();
             line(format!("# Cameras in the model, for --camera: {}", quoted(&names.join(", "))));
         } else {
-            line("# The model has no camera: this one frames it.".to_owned());
+            line("# The model has no camera: this one was chosen by what rays found.".to_owned());
         }
         line(camera_table(camera));
     }
@@ -135,7 +137,7 @@ fn scene_file(
     if has_lights {
         line(format!("# false leaves out the model's {} lights.\nlights = true", loaded.scene.lights.len()));
     } else {
-        line("\n# The model has no lights: these follow the camera.".to_owned());
+        line("\n# The model has no lights: these go with the camera.".to_owned());
         loaded.scene.lights.iter().for_each(|light| line(light_table(light)));
     }
     text

@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::progress::Reporter;
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
+use crate::framing::complete_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{Image, ImageError, exr::SampleType};
 use crate::light_mesh::MeshError;
@@ -236,19 +237,35 @@ fn render_to(
     let mut seconds = Seconds::default();
 
     let spinner = reporter.spinner("reading");
-    let OpenedScene { loaded, choices, auto_exposure: exposure_follows } = open_scene(&args.scene)?;
-    let LoadedScene { scene, cameras, mut settings, skipped, warnings } = loaded;
+    let mut opened = open_scene(&args.scene)?;
     spinner.finish_and_clear();
-    for warning in &warnings {
+    for warning in &opened.loaded.warnings {
         reporter.line(&format!("warning: {warning}"));
     }
-    if !skipped.is_empty() {
-        reporter.line(&format!("warning: {}: left out {skipped}", args.scene.display()));
+    if !opened.loaded.skipped.is_empty() {
+        reporter.line(&format!("warning: {}: left out {}", args.scene.display(), opened.loaded.skipped));
     }
+    args.overrides.apply(&mut opened.loaded.settings);
+    seconds.load = start.elapsed().as_secs_f64();
+
+    let stage = Instant::now();
+    let spinner = reporter.spinner("building");
+    check_memory(&opened.loaded.scene, &[args.backend], args.memory_limit)
+        .map_err(|error| RenderError::MemoryLimit { scene: args.scene.clone(), error })?;
+    let chosen = Backend::build(args.backend, &opened.loaded.scene)?;
+    spinner.finish_and_clear();
+    if let Some(notice) = &chosen.notice {
+        reporter.line(&format!("note: {notice}"));
+    }
+    seconds.build = stage.elapsed().as_secs_f64();
+
+    let stage = Instant::now();
+    complete_view(&mut opened, &chosen.backend);
+    let OpenedScene { loaded, choices, bare } = opened;
+    let LoadedScene { scene, cameras, mut settings, .. } = loaded;
     for choice in &choices {
         reporter.line(&format!("note: {choice}"));
     }
-    args.overrides.apply(&mut settings);
     let camera = match &args.camera {
         None => cameras.first(),
         Some(name) => cameras.iter().find(|camera| camera.name == *name),
@@ -258,18 +275,7 @@ fn render_to(
         name: args.camera.clone().unwrap_or_default(),
         names: cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", "),
     })?;
-    seconds.load = start.elapsed().as_secs_f64();
-
-    let stage = Instant::now();
-    let spinner = reporter.spinner("building");
-    check_memory(&scene, &[args.backend], args.memory_limit)
-        .map_err(|error| RenderError::MemoryLimit { scene: args.scene.clone(), error })?;
-    let chosen = Backend::build(args.backend, &scene)?;
-    spinner.finish_and_clear();
-    if let Some(notice) = &chosen.notice {
-        reporter.line(&format!("note: {notice}"));
-    }
-    seconds.build = stage.elapsed().as_secs_f64();
+    seconds.view = stage.elapsed().as_secs_f64();
 
     let bar = reporter.bar("rendering");
     let rendered = render(&chosen.backend, &scene, camera, &settings, &bar);
@@ -281,7 +287,7 @@ fn render_to(
 
     let stage = Instant::now();
     let Film { resolution: (width, height), pixels } = film;
-    if exposure_follows && args.overrides.exposure.is_none() {
+    if bare && args.overrides.exposure.is_none() {
         settings.exposure = auto_exposure(&pixels);
         reporter.line(&format!("note: exposure {:+} stops", settings.exposure));
     }
@@ -305,6 +311,7 @@ fn render_to(
         version: env!("CARGO_PKG_VERSION"),
         backend: BackendStats { name: chosen.backend.name(), version: chosen.backend.version() },
         triangles: scene.triangle_count(),
+        unique_triangles: scene.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
         lights: scene.lights.len(),
         resolution: [width, height],
         samples_per_pixel: settings.samples_per_pixel,

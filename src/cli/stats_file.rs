@@ -13,6 +13,8 @@ pub struct StatsFile {
     pub backend: BackendStats,
     /// Triangles, instances flattened.
     pub triangles: u64,
+    /// Triangles that are stored.
+    pub unique_triangles: u64,
     /// Lights.
     pub lights: usize,
     /// Columns and rows.
@@ -53,6 +55,8 @@ pub struct Seconds {
     pub load: f64,
     /// Building the acceleration structure.
     pub build: f64,
+    /// Choosing the view of a model that has no camera.
+    pub view: f64,
     /// Camera paths.
     pub paths: f64,
     /// Finding and evaluating mesh points.

@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "every test file uses a part")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
 
+pub mod soup;
+
 use std::sync::Arc;
 
 use glam::Vec3;

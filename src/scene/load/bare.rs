@@ -1,22 +1,23 @@
-//! A model without a scene file: what it lacks is chosen.
+//! A model without a scene file: its settings are chosen. What it lacks of camera and lights,
+//! [`complete_view`](crate::framing::complete_view) chooses.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
-use crate::scene::{Bounds, Camera, Falloff, LightShape, PointLight, Scene};
+use crate::scene::{Bounds, Falloff, LightShape, PointLight, Scene};
 use crate::settings::{Radius, Resolve, Settings, Spacing};
 
-/// What a file holds, ready to render, and what was chosen for it.
+/// What a file holds, and what was chosen for it.
 pub struct OpenedScene {
-    /// The scene.
+    /// The scene; of a bare model perhaps without cameras and lights.
     pub loaded: LoadedScene,
-    /// What a bare model lacked and got, in words; empty for scene files.
+    /// What was chosen for a bare model, in words; empty for scene files.
     pub choices: Vec<String>,
-    /// Whether the exposure is to follow from the picture: nobody stated one.
-    pub auto_exposure: bool,
+    /// Whether it is a model rather than a scene file: nobody stated an exposure, and lights may be added.
+    pub bare: bool,
 }
 
 /// Reads a scene file or a model, by the name's extension.
@@ -26,16 +27,16 @@ pub struct OpenedScene {
 pub fn open_scene(path: &Path) -> Result<OpenedScene, LoadError> {
     if ModelFormat::of(path).is_none() {
         let loaded = load_scene_file(path)?;
-        return Ok(OpenedScene { loaded, choices: Vec::new(), auto_exposure: false });
+        return Ok(OpenedScene { loaded, choices: Vec::new(), bare: false });
     }
     let model = load_model(path)?;
     Ok(complete(model))
 }
 
-/// Turns a model into a scene: physical units, a camera that frames it if it has none, lights if it has none.
+/// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
 pub fn complete(model: Model) -> OpenedScene {
-    let Model { meshes, instances, materials, parts: _, lights, mut cameras, skipped, warnings } = model;
-    let mut scene = Scene {
+    let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
+    let scene = Scene {
         meshes: meshes.into_iter().map(Arc::new).collect(),
         instances,
         materials,
@@ -43,84 +44,14 @@ pub fn complete(model: Model) -> OpenedScene {
         falloff: Falloff::InverseSquare,
         background: Vec3::ZERO,
     };
-    let mut choices = Vec::new();
-    let bounds = scene.bounds();
     let mut settings = Settings { lambertian: true, ..Settings::default() };
-    let (width, height) = settings.resolution;
-    if cameras.is_empty() {
-        cameras.push(framing_camera(&scene, bounds, width as f32 / height as f32));
-        choices.push("no camera in the file: one that frames the model".to_owned());
-    }
-    if let Some(camera) = cameras.first()
-        && scene.lights.is_empty()
-    {
-        scene.lights.extend(default_lights(camera));
-        choices.push(format!("no lights in the file: {} directional ones", scene.lights.len()));
-    }
-    let spacing = spacing(bounds, &scene.lights);
+    let spacing = spacing(scene.bounds(), &scene.lights);
     settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
     settings.light_mesh.points.radius = Radius::Spacings(2.0);
     settings.light_mesh.resolve = Resolve::Trace;
-    choices.push(format!("mesh points every {spacing} units, shadow edges traced"));
+    let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
     let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
-    OpenedScene { loaded, choices, auto_exposure: true }
-}
-
-/// Vertical field of view of the framing camera, degrees.
-const FRAMING_FOV: f32 = 40.0;
-/// Towards the framing camera from the model's middle: from the front, somewhat from the right and above.
-const FRAMING_DIRECTION: Vec3 = Vec3::new(0.55, 0.42, 1.0);
-/// Room around the model.
-const FRAMING_MARGIN: f32 = 1.05;
-
-/// The nearest camera in the framing direction that has all of the scene in view.
-fn framing_camera(scene: &Scene, bounds: Bounds, aspect: f32) -> Camera {
-    let center = bounds.center();
-    let back = FRAMING_DIRECTION.normalize();
-    let right = Vec3::Y.cross(back).normalize();
-    let up = back.cross(right);
-    let half = (FRAMING_FOV.to_radians() * 0.5).tan();
-    let slopes = Vec2::new(half * aspect, half) / FRAMING_MARGIN;
-    let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.bounds()).collect();
-    let mut distance = 0.0f32;
-    for instance in &scene.instances {
-        let Some(bounds) = mesh_bounds.get(instance.mesh as usize) else { continue };
-        for corner in 0..8 {
-            let choose =
-                |axis: usize| if corner >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] };
-            let corner = Vec3::new(choose(0), choose(1), choose(2));
-            let corner = instance.to_world.map_or(corner, |to_world| to_world.transform_point3(corner));
-            let offset = corner - center;
-            let across = Vec2::new(offset.dot(right), offset.dot(up)).abs() / slopes;
-            distance = distance.max(across.max_element() + offset.dot(back));
-        }
-    }
-    // A model of no extent is no model, but the camera must still look somewhere.
-    let distance = distance.max(center.abs().max_element() * 1e-4).max(1e-6);
-    Camera {
-        name: "default".to_owned(),
-        position: center + back * distance,
-        look_at: center,
-        up: Vec3::Y,
-        vertical_fov: FRAMING_FOV,
-    }
-}
-
-/// Three directional lights relative to a camera: from the upper left, weaker from the right, and from straight above.
-fn default_lights(camera: &Camera) -> [PointLight; 3] {
-    let back = (camera.position - camera.look_at).normalize_or(Vec3::Z);
-    let right = camera.up.cross(back).normalize_or(Vec3::X);
-    let up = back.cross(right);
-    let light = |towards: Vec3, illuminance: f32| PointLight {
-        position: camera.position,
-        intensity: Vec3::splat(illuminance),
-        shape: LightShape::Directional { direction: -towards.normalize_or(Vec3::Y) },
-    };
-    [
-        light(back + 0.7 * up - 0.6 * right, 2.5),
-        light(back + 0.1 * up + 0.9 * right, 0.8),
-        light(camera.up.normalize_or(Vec3::Y) + 0.2 * back, 1.2),
-    ]
+    OpenedScene { loaded, choices, bare: true }
 }
 
 /// Parts of the scene's diagonal between mesh points: at most, without knowledge of the lights, and at least.
@@ -154,9 +85,7 @@ fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
     nearest.sort_by(f32::total_cmp);
     let spacing = nearest.get(nearest.len() / 2).map_or(middle, |median| (median * 0.25).clamp(least, most));
     // Two digits say what is meant.
-    let unit = 10f32.powf(spacing.log10().floor() - 1.0);
-    let rounded = (spacing / unit).round() * unit;
-    if rounded.is_finite() && rounded > 0.0 { rounded } else { spacing }
+    format!("{spacing:.1e}").parse().unwrap_or(spacing)
 }
 
 /// Exposure in stops at which a picture is neither dark nor washed out: nine tenths of what is lit stay below 60 % of

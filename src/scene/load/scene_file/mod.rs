@@ -33,7 +33,7 @@ use crate::settings::Settings;
 pub struct LoadedScene {
     /// The scene.
     pub scene: Scene,
-    /// The scene file's camera first, then those of its models; at least one.
+    /// The scene file's camera first, then those of its models; at least one, but in bare models that bring none.
     pub cameras: Vec<Camera>,
     /// The defaults with the file's settings in their place.
     pub settings: Settings,
