@@ -147,7 +147,7 @@ pub struct IndirectSettings {
 
 impl IndirectSettings {
     /// Indirect light varies slowly: unless told otherwise, spacing and radius are this many times the direct mesh's.
-    pub const COARSENESS: f32 = 3.0;
+    pub const COARSENESS: f32 = 2.0;
 
     /// Points for indirect light, given those for direct light.
     pub fn coarser(points: &PointSettings) -> PointSettings {

@@ -40,7 +40,7 @@ impl Scratch {
     /// Finds the points of D_y that count for a surface point; all must be known.
     ///
     /// `inside` tells by slot which points lie in geometry; `disagree` whether points differ so much that it matters
-    /// which of them the surface point sees. `visible` remembers those, bit i for point i, 0 before it is known.
+    /// which of them the surface point sees.
     #[inline(always)]
     pub(super) fn find<A: Accel>(
         &mut self,
@@ -48,7 +48,6 @@ impl Scratch {
         mesh: &MeshPoints,
         surface: &SurfacePoint,
         inside: &[bool],
-        visible: Option<&mut u64>,
         disagree: impl Fn(&[u32]) -> bool,
     ) {
         self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.points));
@@ -65,7 +64,7 @@ impl Scratch {
             }
             Leaks::Visibility => {
                 if disagree(self.points.slots()) {
-                    self.rays += keep_visible(accel, mesh, surface, &mut self.points, visible);
+                    self.rays += keep_visible(accel, mesh, surface, &mut self.points);
                 }
             }
         }
@@ -111,7 +110,7 @@ impl DirectMesh {
     /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.
     #[inline(always)]
     pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        scratch.find(accel, &self.points, surface, &self.inside, None, |slots| self.disagree(slots));
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let points = &scratch.points;
         let scale = 1.0 / points.total_weight();
         match self.estimator {
@@ -180,7 +179,7 @@ impl DirectMesh {
         mixed: &mut [VisibilityBits],
     ) {
         // Disagreement is settled by rays to the lights themselves: fewer opinions would only hide it.
-        scratch.find(accel, &self.points, surface, &self.inside, None, |_| false);
+        scratch.find(accel, &self.points, surface, &self.inside, |_| false);
         let chunks = self.lights.chunks().len();
         seen.fill(VisibilityBits::MAX);
         mixed.fill(0);

@@ -14,6 +14,7 @@ use super::estimator::{DirectMesh, Scratch};
 use super::leaks::{amounts_differ, is_inside_by_share};
 use super::neighbours::Neighbours;
 use super::normal_table::{self, NormalSums, NormalWeights};
+use super::patches::Patches;
 use super::points::{AUTO_SPACINGS, MeshError, MeshPoints};
 use super::sphere::{SphereStrata, noise};
 use super::store::{NeededPoints, PointMask};
@@ -213,7 +214,9 @@ impl IndirectMesh {
         gathering: &Gathering,
     ) -> u64 {
         let first = self.values.len();
-        let (one_bounce, mut rays) = self.sweep(gathering, |x, hits, _, sums, scratch| {
+        let directions = self.strata.len() as usize;
+        let (one_bounce, mut rays) = self.sweep(gathering, |point, sums, scratch| {
+            let (x, hits) = (gathering.points[point], &gathering.hits[point * directions..][..directions]);
             self.for_each_hit(scene, x, hits, |cell, direction, surface| {
                 let light = surface.map_or(scene.background, |surface| {
                     let illumination = direct.illumination(accel, &surface, scratch) * direct_scale;
@@ -230,21 +233,36 @@ impl IndirectMesh {
             scratch.rays += self.add_emitters(accel, scene, x, sums);
         });
         self.values.extend_from_slice(&one_bounce);
+        if self.settings.bounces == 1 {
+            return rays;
+        }
+        // A quarter of R: a fraction of what the mean over D_y blurs.
+        let width = |surface: &SurfacePoint| 0.25 * self.points.radius_at(surface.position);
+        let patches = Patches::new(gathering.hits.len(), width, |hit| {
+            let x = gathering.points[hit / directions];
+            let direction = self.strata.jittered((hit % directions) as u32, x);
+            gathering.hits[hit].as_ref().map(|hit| scene.surface_point(hit, direction))
+        });
         let peak =
             |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
-        // What a hit sees of its D_y is the same for all bounces; it is asked once.
-        let mut visible = vec![0; if self.settings.bounces > 1 { gathering.hits.len() } else { 0 }];
         for _ in 1..self.settings.bounces {
-            let (mut next, more) =
-                self.sweep_with(gathering, &mut visible, |x, hits, visible, sums, scratch| {
-                    self.for_each_hit(scene, x, hits, |cell, direction, surface| {
-                        if let Some(surface) = surface {
-                            let received = self.received(accel, &surface, scratch, Some(&mut visible[cell]));
-                            self.accumulate(sums, direction, surface.diffuse * received);
-                        }
-                    });
-                });
-            rays += more;
+            let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
+                .surfaces
+                .par_iter()
+                .map_init(Scratch::default, |scratch, surface| {
+                    scratch.rays = 0;
+                    (surface.diffuse * self.illumination(accel, surface, scratch), scratch.rays)
+                })
+                .unzip();
+            rays += traced.iter().sum::<u64>();
+            let (mut next, _) = self.sweep(gathering, |point, sums, _| {
+                let x = gathering.points[point];
+                for cell in 0..directions {
+                    if let Some(patch) = patches.of(point * directions + cell) {
+                        self.accumulate(sums, self.strata.jittered(cell as u32, x), radiance[patch]);
+                    }
+                }
+            });
             let flat = next.as_flattened_mut();
             flat.iter_mut().zip(one_bounce.as_flattened()).for_each(|(value, first)| *value += first);
             let change = flat
@@ -301,39 +319,25 @@ impl IndirectMesh {
         rays
     }
 
-    /// Calls `gather(x, hits, _, sums, scratch)` for all points and returns the values that the sums make, and the rays
-    /// that scratch counted.
+    /// Calls `gather(point, sums, scratch)` for all points and returns the values that the sums make, and the rays that
+    /// scratch counted.
     fn sweep(
         &self,
         gathering: &Gathering,
-        gather: impl Fn(Vec3, &[Option<Hit>], &mut [u64], &mut NormalSums, &mut Scratch) + Sync,
-    ) -> (Vec<[f32; 3]>, u64) {
-        self.sweep_with(gathering, &mut [], gather)
-    }
-
-    /// The same with a number for each hit, or with none at all.
-    fn sweep_with(
-        &self,
-        gathering: &Gathering,
-        numbers: &mut [u64],
-        gather: impl Fn(Vec3, &[Option<Hit>], &mut [u64], &mut NormalSums, &mut Scratch) + Sync,
+        gather: impl Fn(usize, &mut NormalSums, &mut Scratch) + Sync,
     ) -> (Vec<[f32; 3]>, u64) {
         let entries = self.entries();
-        let directions = self.strata.len() as usize;
+        let directions = self.strata.len() as f32;
         let mut values = vec![[0.0f32; 3]; gathering.points.len() * entries];
-        let mut parts: Vec<&mut [u64]> = numbers.chunks_mut(directions).collect();
-        parts.resize_with(gathering.points.len(), || &mut []);
         let rays = values
             .par_chunks_mut(entries)
-            .zip(gathering.hits.par_chunks(directions))
-            .zip(parts.into_par_iter())
-            .zip(&gathering.points)
-            .map_init(NormalSums::default, |sums, (((values, hits), numbers), &x)| {
+            .enumerate()
+            .map_init(NormalSums::default, |sums, (point, values)| {
                 pulp::Arch::new().dispatch(|| {
                     sums.clear();
                     let mut scratch = Scratch::default();
-                    gather(x, hits, numbers, sums, &mut scratch);
-                    sums.write_means(directions as f32, values);
+                    gather(point, sums, &mut scratch);
+                    sums.write_means(directions, values);
                     scratch.rays
                 })
             })
@@ -351,19 +355,7 @@ impl IndirectMesh {
     /// radiance that an all-white surface would send back.
     #[inline(always)]
     pub fn illumination<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut Scratch) -> Vec3 {
-        self.received(accel, surface, scratch, None)
-    }
-
-    /// The same; `visible` remembers which points of D_y the surface point sees.
-    #[inline(always)]
-    fn received<A: Accel>(
-        &self,
-        accel: &A,
-        surface: &SurfacePoint,
-        scratch: &mut Scratch,
-        visible: Option<&mut u64>,
-    ) -> Vec3 {
-        scratch.find(accel, &self.points, surface, &self.inside, visible, |slots| self.disagree(slots));
+        scratch.find(accel, &self.points, surface, &self.inside, |slots| self.disagree(slots));
         let points = &mut scratch.points;
         if self.settings.at_surface {
             let (y, normal) = (surface.position, surface.geometric_normal);

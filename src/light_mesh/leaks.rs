@@ -79,23 +79,15 @@ pub fn lights_differ<'a>(mut points: impl Iterator<Item = &'a [VisibilityBits]> 
 }
 
 /// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.
-///
-/// `known` remembers what was seen, bit i for point i, if there are no more than 64; 0 stands for not yet asked.
 pub fn keep_visible<A: Accel>(
     accel: &A,
     mesh: &MeshPoints,
     surface: &SurfacePoint,
     points: &mut Neighbours,
-    known: Option<&mut u64>,
 ) -> u64 {
-    let count = points.ids().len();
-    let known = known.filter(|_| count <= u64::BITS as usize);
-    if let Some(seen) = known.as_deref().copied().filter(|&seen| seen != 0) {
-        points.keep(|index, _| seen >> index & 1 == 1);
-        return 0;
-    }
     let origin = surface.ray_origin();
-    let mut blocked = Vec::with_capacity(count);
+    let rays = points.ids().len();
+    let mut blocked = Vec::with_capacity(rays);
     for group in points.ids().chunks(LANES) {
         let mut packet = RayPacket::<LANES>::empty();
         for (lane, &id) in group.iter().enumerate() {
@@ -105,10 +97,6 @@ pub fn keep_visible<A: Accel>(
         let lanes = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
         blocked.extend((0..group.len()).map(|lane| lanes >> lane & 1 == 1));
     }
-    if let Some(known) = known {
-        let seen = blocked.iter().rev().fold(0, |seen, &blocked| seen << 1 | u64::from(!blocked));
-        *known = if seen == 0 { u64::MAX } else { seen };
-    }
     points.keep(|index, _| !blocked[index]);
-    count as u64
+    rays as u64
 }

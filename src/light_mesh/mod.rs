@@ -10,6 +10,7 @@ mod leaks;
 mod lights;
 mod neighbours;
 mod normal_table;
+mod patches;
 mod points;
 mod scattered;
 mod sphere;

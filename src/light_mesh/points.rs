@@ -141,6 +141,12 @@ impl MeshPoints {
         })
     }
 
+    /// R at a position.
+    #[inline(always)]
+    pub fn radius_at(&self, y: Vec3) -> f32 {
+        self.layer_at(y).radius
+    }
+
     #[inline(always)]
     fn layer_at(&self, y: Vec3) -> &Layer {
         let mut found = &self.layers[0];

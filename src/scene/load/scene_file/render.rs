@@ -7,7 +7,7 @@ use super::place::Places;
 use super::values::{Count, Fraction, Stops};
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Radius, Resolve, Settings};
 
 /// Pixels that a picture may have.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -52,6 +52,7 @@ impl PresetName {
                 settings.light_mesh.estimator = Estimator::PerLight;
                 // Point lights cast sharp shadows.
                 settings.light_mesh.resolve = Resolve::Trace;
+                settings.light_mesh.points.radius = Radius::Spacings(1.5);
                 settings.light_mesh.indirect = Some(IndirectSettings {
                     form: IndirectForm::Directional,
                     bounces: 16,
