@@ -10,7 +10,7 @@ pub const WIDTHS: [usize; 4] = [1, 4, 8, 16];
 pub struct Query {
     /// Whether anything is on the ray, or else what comes first.
     pub occlusion: bool,
-    /// One of [`WIDTHS`].
+    /// One of 1, 4, 8 and 16.
     pub width: usize,
 }
 
