@@ -81,6 +81,18 @@ pub fn blocks(resolution: (u32, u32), block_pixels: u64) -> Vec<Vec<Tile>> {
 mod tests {
     use super::*;
 
+    /// The squares around one are those that touch it, and none beyond the tile's edges; rows of narrow tiles don't mix.
+    #[test]
+    fn squares_know_their_neighbours() {
+        for square in 0..64i32 {
+            let (x, y) = (square % 8, square / 8);
+            let touching = (0..64).filter(|other| (other % 8 - x).abs() <= 1 && (other / 8 - y).abs() <= 1);
+            assert_eq!(Tile::around(1 << square), touching.fold(0, |mask, other| mask | 1 << other));
+        }
+        let narrow = Tile { x: 0, y: 0, width: 6, height: 32 };
+        assert_eq!([0, 3, 4, 5, 6 * 4, 6 * 31 + 5].map(|pixel| narrow.square_of(pixel)), [0, 0, 1, 1, 8, 57]);
+    }
+
     /// Every pixel belongs to exactly one square of one tile of one block.
     #[test]
     fn tiles_cover_the_image_once() {
