@@ -4,6 +4,9 @@
 //! Hits are compared to the last bit: the reference does the same arithmetic without boxes, trees and SIMD, so
 //! that any difference is a hit that a box culled, a lane mixed up or a tie broken otherwise.
 
+#[path = "common/triangles.rs"]
+mod triangles;
+
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
@@ -12,51 +15,8 @@ use lightmesh::accel::{
     Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, PacketLanes, Ray, RayHitPacket, RayPacket,
     hit_of_lane,
 };
-use lightmesh::scene::{CutOut, Instance, Positions, Scene, TriangleMaterials, TriangleMesh};
-
-/// SplitMix64: small, seeded, and the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [−1, 1).
-    fn signed(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    }
-
-    fn vec(&mut self) -> Vec3 {
-        Vec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-}
-
-fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    Arc::new(TriangleMesh {
-        name: String::new(),
-        positions: Positions::new(positions),
-        triangles: Arc::new(triangles),
-        normals: None,
-        uvs: None,
-        colors: None,
-        materials: TriangleMaterials::Uniform(0),
-        cutout,
-    })
-}
-
-fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
-    let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, ..Scene::default() }
-}
+use lightmesh::scene::{CutOut, Scene, TriangleMesh};
+use triangles::{Random, mesh, scene};
 
 fn single(mesh: Arc<TriangleMesh>) -> Scene {
     scene(vec![mesh], vec![(0, None)])
@@ -67,16 +27,6 @@ fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {
     let positions: Vec<_> = triangles.into_iter().flatten().map(|p| p.to_array()).collect();
     let count = positions.len() as u32 / 3;
     mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), None)
-}
-
-fn random_soup(random: &mut Random, count: usize, size: f32) -> Arc<TriangleMesh> {
-    let triangles: Vec<_> = (0..count)
-        .map(|_| {
-            let center = random.vec();
-            [0; 3].map(|_| center + size * random.vec())
-        })
-        .collect();
-    soup(triangles)
 }
 
 /// Sphere of `rings` × 2`rings` quads, closed at the poles.
@@ -209,7 +159,7 @@ fn rays_for(random: &mut Random, target: &TriangleMesh, count: usize) -> Vec<Ray
         rays.push(Ray::new(corners[0] - (corners[2] - corners[1]), corners[2] - corners[1]));
         rays.push(Ray::between(corners[0].lerp(corners[1], 0.3), random.vec()));
         let mut axis = Vec3::ZERO;
-        axis[random.below(3)] = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+        axis[random.below(3)] = if random.below(2) == 0 { 1.0 } else { -1.0 };
         rays.push(Ray::new(corners[0] - 2.0 * axis, axis));
         rays.push(Ray::new(origin, axis));
         let mut flat = random.vec();
@@ -232,9 +182,9 @@ fn rays_for(random: &mut Random, target: &TriangleMesh, count: usize) -> Vec<Ray
 
 #[test]
 fn random_triangles_of_all_sizes_give_the_hits_of_the_reference() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     for (count, size) in [(1, 0.5), (2, 0.5), (9, 0.5), (70, 0.3), (400, 0.1), (3000, 0.02), (300, 2.0)] {
-        let mesh = random_soup(&mut random, count, size);
+        let mesh = triangles::soup(&mut random, count, size, None);
         let rays = rays_for(&mut random, &mesh, 1500);
         check(&single(mesh), &rays);
     }
@@ -242,7 +192,7 @@ fn random_triangles_of_all_sizes_give_the_hits_of_the_reference() {
 
 #[test]
 fn shared_edges_and_axis_parallel_faces_give_the_hits_of_the_reference() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     for mesh in [sphere(12, 0.9), cube(5)] {
         let rays = rays_for(&mut random, &mesh, 3000);
         check(&single(mesh), &rays);
@@ -253,7 +203,7 @@ fn shared_edges_and_axis_parallel_faces_give_the_hits_of_the_reference() {
 /// rays aim where leaks come from: at vertices and points of edges, with all roundings of the direction.
 #[test]
 fn no_ray_escapes_from_inside_closed_surfaces() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for mesh in [sphere(24, 1.0), cube(9)] {
         for (offset, scale) in [(Vec3::ZERO, 1.0), (Vec3::new(300.0, -7.0, 0.1), 1.0), (Vec3::ZERO, 1e-6)] {
             let positions = mesh.positions.as_slice().iter();
@@ -285,7 +235,7 @@ fn no_ray_escapes_from_inside_closed_surfaces() {
 
 #[test]
 fn triangles_that_are_degenerate_huge_or_not_finite_do_no_harm() {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let mut triangles: Vec<[Vec3; 3]> = (0..200).map(|_| [0; 3].map(|_| random.vec())).collect();
     for i in 0..60 {
         let p = random.vec();
@@ -311,7 +261,7 @@ fn triangles_that_are_degenerate_huge_or_not_finite_do_no_harm() {
 
 #[test]
 fn coordinates_of_1e11_are_hit_like_those_of_1_and_those_beyond_the_limit_are_not() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let small: Vec<[Vec3; 3]> = (0..300).map(|_| [0; 3].map(|_| random.vec())).collect();
     // A power of two, so that scaling rounds nothing.
     let scale = 2f32.powi(36);
@@ -377,7 +327,7 @@ fn rays_that_are_not_finite_or_have_no_direction_hit_nothing() {
 
 #[test]
 fn empty_scenes_and_scenes_of_one_triangle_are_answered() {
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let empty = mesh(vec![], vec![], None);
     let rays = rays_for(&mut random, &empty, 200);
     check(&Scene::default(), &rays);
@@ -396,7 +346,7 @@ fn empty_scenes_and_scenes_of_one_triangle_are_answered() {
 
 #[test]
 fn of_hits_at_the_same_distance_the_lowest_instance_and_triangle_is_reported() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let triangle = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
     let copies = soup([triangle; 50]);
     let scene = scene(
@@ -423,8 +373,12 @@ fn placements(random: &mut Random) -> Vec<Affine3A> {
 
 #[test]
 fn instances_of_any_affine_or_singular_transform_give_the_hits_of_the_reference() {
-    let mut random = Random(8);
-    let meshes = vec![random_soup(&mut random, 60, 0.3), sphere(5, 0.6), random_soup(&mut random, 30, 0.3)];
+    let mut random = Random::new(8);
+    let meshes = vec![
+        triangles::soup(&mut random, 60, 0.3, None),
+        sphere(5, 0.6),
+        triangles::soup(&mut random, 30, 0.3, None),
+    ];
     let mut instances: Vec<_> =
         placements(&mut random).into_iter().enumerate().map(|(i, m)| (i as u32 % 2, Some(m))).collect();
     instances.insert(3, (2, None));
@@ -438,7 +392,7 @@ fn instances_of_any_affine_or_singular_transform_give_the_hits_of_the_reference(
 /// Rounding differs between the two, so only hits well inside their triangle are compared, by distance.
 #[test]
 fn instanced_and_flattened_geometry_agree() {
-    let mut random = Random(9);
+    let mut random = Random::new(9);
     let shape = sphere(6, 0.6);
     let placements = placements(&mut random);
     let flat: Vec<_> = placements
@@ -471,11 +425,11 @@ fn instanced_and_flattened_geometry_agree() {
 
 #[test]
 fn cut_outs_let_rays_through_in_every_query() {
-    let mut random = Random(10);
+    let mut random = Random::new(10);
     let holes: CutOut =
         Arc::new(|triangle, u, v| triangle % 2 == 0 && (u * 8.0) as i32 % 2 == (v * 8.0) as i32 % 2);
-    let solid = random_soup(&mut random, 200, 0.5);
-    let leaves = random_soup(&mut random, 200, 0.5);
+    let solid = triangles::soup(&mut random, 200, 0.5, None);
+    let leaves = triangles::soup(&mut random, 200, 0.5, None);
     let leaves = mesh(leaves.positions.as_slice().to_vec(), leaves.triangles.to_vec(), Some(holes));
     let rays = rays_for(&mut random, &solid, 2000);
     let turned = Affine3A::from_rotation_y(0.7);
@@ -492,9 +446,12 @@ fn cut_outs_let_rays_through_in_every_query() {
 /// culling and work counters are not.
 #[test]
 fn the_tree_is_the_same_for_any_number_of_threads() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     // Above the size from which ranges are binned in parallel.
-    let meshes = vec![random_soup(&mut random, 150_000, 0.01), random_soup(&mut random, 5000, 0.1)];
+    let meshes = vec![
+        triangles::soup(&mut random, 150_000, 0.01, None),
+        triangles::soup(&mut random, 5000, 0.1, None),
+    ];
     let scene = scene(meshes, vec![(0, None), (1, Some(Affine3A::from_translation(Vec3::X)))]);
     let digests = [1, 2, 7].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -510,7 +467,7 @@ fn the_tree_is_the_same_for_any_number_of_threads() {
 /// Inputs that defeat the surface-area heuristic must not make a tree deeper than the stack.
 #[test]
 fn inputs_that_make_deep_trees_are_built_and_answered() {
-    let mut random = Random(12);
+    let mut random = Random::new(12);
     // Each triangle is 10 % larger than the one before: every split peels off a few.
     let nested = soup((0..800).map(|i| [Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 1e-12 * 1.1f32.powi(i))));
     let same = soup([[Vec3::X, Vec3::Y, Vec3::Z]; 3000]);

@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
 
+#[path = "common/triangles.rs"]
+mod triangles;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,25 +16,8 @@ use lightmesh::accel::{
 use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
-use lightmesh::scene::{CutOut, Instance, Material, Positions, Scene, TriangleMaterials, TriangleMesh};
-
-fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    Arc::new(TriangleMesh {
-        name: "test".into(),
-        positions: Positions::new(positions),
-        triangles: Arc::new(triangles),
-        normals: None,
-        uvs: None,
-        colors: None,
-        materials: TriangleMaterials::Uniform(0),
-        cutout,
-    })
-}
-
-fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
-    let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, materials: vec![Material::default()], ..Scene::default() }
-}
+use lightmesh::scene::{CutOut, Scene};
+use triangles::{mesh, scene};
 
 /// A square of two triangles at z = 0, from (0, 0) to (1, 1), whose diagonal runs from (0, 0) to (1, 1).
 fn square(cutout: Option<CutOut>) -> Scene {

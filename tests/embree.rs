@@ -2,6 +2,9 @@
 //! width, on every kind of scene. Both versions of Embree must pass; `tests/debian13.sh` runs the other one.
 #![cfg(feature = "embree")]
 
+#[path = "common/triangles.rs"]
+mod triangles;
+
 use std::{io::Write, sync::Arc};
 
 use embree_sys::Library;
@@ -11,8 +14,9 @@ use lightmesh::{
         Accel, BruteForceAccel, Coherence, EmbreeAccel, EmbreeError, Hit, PacketLanes, Ray, RayHitPacket,
         hit_of_lane,
     },
-    scene::{CutOut, Instance, Positions, Scene, TriangleMaterials, TriangleMesh},
+    scene::{CutOut, Scene, TriangleMesh},
 };
+use triangles::{Random, mesh, scene, soup};
 
 /// The backend over a scene. Without Embree the test is skipped, aloud; where `REQUIRE_EMBREE` is set it fails,
 /// as it does where that names another major version.
@@ -37,54 +41,9 @@ fn embree(scene: &Scene) -> Option<EmbreeAccel> {
     }
 }
 
-/// SplitMix64: small, seeded, and the same everywhere.
-struct Random(u64);
-
-impl Random {
-    /// In [−1, 1).
-    fn signed(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    }
-
-    fn vec(&mut self) -> Vec3 {
-        Vec3::new(self.signed(), self.signed(), self.signed())
-    }
-}
-
-fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    Arc::new(TriangleMesh {
-        name: "test".into(),
-        positions: Positions::new(positions),
-        triangles: Arc::new(triangles),
-        normals: None,
-        uvs: None,
-        colors: None,
-        materials: TriangleMaterials::Uniform(0),
-        cutout,
-    })
-}
-
-fn soup(random: &mut Random, count: u32, size: f32, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    let corners = (0..count).flat_map(|_| {
-        let centre = random.vec();
-        [0; 3].map(|_| (centre + size * random.vec()).to_array())
-    });
-    let positions = corners.collect();
-    mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), cutout)
-}
-
 /// A triangle of legs `size` at z = 0 with its right angle at (x, y).
 fn corner(x: f32, y: f32, size: f32) -> Arc<TriangleMesh> {
     mesh(vec![[x, y, 0.0], [x + size, y, 0.0], [x, y + size, 0.0]], vec![[0, 1, 2]], None)
-}
-
-fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
-    let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, ..Scene::default() }
 }
 
 fn rays(random: &mut Random, count: usize) -> Vec<Ray> {
@@ -176,7 +135,7 @@ fn check_packets<const N: usize>(embree: &EmbreeAccel, rays: &[Ray]) {
 
 #[test]
 fn meshes_in_world_space_are_hit_where_the_reference_says() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let meshes = vec![soup(&mut random, 150, 0.2, None), soup(&mut random, 100, 0.4, None)];
     let rays = rays(&mut random, 3000);
     check(&scene(meshes, vec![(0, None), (1, None)]), &rays);
@@ -185,7 +144,7 @@ fn meshes_in_world_space_are_hit_where_the_reference_says() {
 /// Placed meshes, one of them several times, beside one in world space: the hit names the instance.
 #[test]
 fn instances_are_hit_where_the_reference_says() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let meshes = vec![soup(&mut random, 60, 0.3, None), soup(&mut random, 60, 0.3, None)];
     let place = |linear: Mat3, translation: Vec3| Some(Affine3A::from_mat3_translation(linear, translation));
     let shear =
@@ -205,7 +164,7 @@ fn instances_are_hit_where_the_reference_says() {
 /// A cut-out decides in nearest hits and in occlusion alike, also through instances.
 #[test]
 fn cut_outs_let_rays_through() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let cutout: CutOut = Arc::new(|triangle, u, v| triangle % 3 != 0 && (u > 0.3 || v > 0.5));
     let meshes = vec![soup(&mut random, 150, 0.5, Some(cutout))];
     let to_world = Affine3A::from_scale(Vec3::new(0.7, -1.2, 1.0));
@@ -338,7 +297,7 @@ fn no_ray_escapes_through_the_edges_of_a_closed_ball() {
     }
     let ball = scene(vec![mesh(positions.clone(), triangles.clone(), None)], vec![(0, None)]);
     let Some(embree) = embree(&ball) else { return };
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let (mut at_vertices, mut escaped) = (0, 0);
     for _ in 0..30 {
         let origin = 0.5 * random.vec();
@@ -403,7 +362,7 @@ fn hits_do_not_depend_on_the_threads_of_the_build() {
 /// The statistics report what Embree holds: something for 20,000 triangles, less for one.
 #[test]
 fn memory_follows_the_scene() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let large = scene(vec![soup(&mut random, 20_000, 0.1, None)], vec![(0, None)]);
     let small = scene(vec![corner(0.0, 0.0, 1.0)], vec![(0, None)]);
     let (Some(large), Some(small)) = (embree(&large), embree(&small)) else { return };

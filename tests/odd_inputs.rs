@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
 
+#[path = "common/triangles.rs"]
+mod triangles;
+
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
@@ -12,36 +15,9 @@ use lightmesh::accel::{
 };
 use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::scene::random::SplitMix64;
-use lightmesh::scene::{CutOut, Instance, Material, Positions, Scene, TriangleMaterials, TriangleMesh};
+use lightmesh::scene::{CutOut, Scene, TriangleMesh};
 use lightmesh::with_accel;
-
-fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    Arc::new(TriangleMesh {
-        name: "test".into(),
-        positions: Positions::new(positions),
-        triangles: Arc::new(triangles),
-        normals: None,
-        uvs: None,
-        colors: None,
-        materials: TriangleMaterials::Uniform(0),
-        cutout,
-    })
-}
-
-fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
-    let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, materials: vec![Material::default()], ..Scene::default() }
-}
-
-fn soup(seed: u64, count: u32, size: f32, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
-    let mut random = SplitMix64::new(seed);
-    let corners = (0..count).flat_map(|_| {
-        let middle = random.in_box(Vec3::NEG_ONE, Vec3::ONE);
-        [0; 3].map(|_| (middle + size * random.in_box(Vec3::NEG_ONE, Vec3::ONE)).to_array())
-    });
-    let positions = corners.collect();
-    mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), cutout)
-}
+use triangles::{Random, mesh, scene, soup};
 
 /// A right triangle at z = 0 with legs of length `size` along x and y.
 fn corner(size: f32) -> Arc<TriangleMesh> {
@@ -118,14 +94,21 @@ fn affine_and_mirrored_instances_are_answered_alike() {
         }
         instances.push((i % 2, Some(Affine3A::from_mat3_translation(0.5 * linear, 2.0 * axis()))));
     }
-    assert_clean("instances", &scene(vec![soup(2, 60, 0.3, None), soup(3, 40, 0.5, None)], instances));
+    assert_clean(
+        "instances",
+        &scene(
+            vec![soup(&mut Random::new(2), 60, 0.3, None), soup(&mut Random::new(3), 40, 0.5, None)],
+            instances,
+        ),
+    );
 }
 
 #[test]
 fn cut_outs_are_answered_alike() {
     let holes: CutOut =
         Arc::new(|triangle, u, v| triangle % 3 == 0 || ((u * 6.0) as i32 + (v * 6.0) as i32) % 2 == 0);
-    let meshes = vec![soup(4, 150, 0.5, Some(holes)), soup(5, 30, 0.3, None)];
+    let meshes =
+        vec![soup(&mut Random::new(4), 150, 0.5, Some(holes)), soup(&mut Random::new(5), 30, 0.3, None)];
     let mirrored = Affine3A::from_scale(Vec3::new(0.7, -1.2, 1.0));
     assert_clean("cut-outs", &scene(meshes, vec![(0, None), (1, None), (0, Some(mirrored))]));
 }
@@ -157,7 +140,13 @@ fn near_singular_placements_are_hit_by_all_backends_or_by_none() {
     }
     let places = [leaning(1e-3), Affine3A::from_scale(Vec3::new(1.0, 1e-3, -1.0)), leaning(1e-6)];
     let instances = places.map(|place| (0, Some(place))).into_iter().chain([(1, None)]).collect();
-    assert_clean("near-singular", &scene(vec![soup(6, 50, 0.4, None), soup(7, 50, 0.4, None)], instances));
+    assert_clean(
+        "near-singular",
+        &scene(
+            vec![soup(&mut Random::new(6), 50, 0.4, None), soup(&mut Random::new(7), 50, 0.4, None)],
+            instances,
+        ),
+    );
 }
 
 /// A coordinate that no ray tracer in single precision can work with costs its triangle, and no other.
@@ -253,7 +242,10 @@ fn scenes_of_nothing_one_triangle_or_degenerate_ones_are_answered_alike() {
         ("degenerate triangles", scene(vec![degenerate.clone()], vec![(0, None)])),
         (
             "degenerate among others",
-            scene(vec![degenerate, soup(9, 40, 0.4, None)], vec![(0, None), (1, None), (0, place)]),
+            scene(
+                vec![degenerate, soup(&mut Random::new(9), 40, 0.4, None)],
+                vec![(0, None), (1, None), (0, place)],
+            ),
         ),
     ] {
         assert_clean(name, &scene);

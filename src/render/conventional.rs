@@ -2,10 +2,9 @@
 
 use glam::Vec3;
 
-use super::hybrid::emit_seen;
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
-use super::surface_group::SurfaceGroup;
+use super::surface_group::{SurfaceGroup, emit_seen};
 use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters};
 use crate::accel::Accel;

@@ -9,10 +9,10 @@
 use glam::Vec3;
 
 use super::paths::PathVertex;
-use super::surface_group::SurfaceGroup;
+use super::surface_group::{SurfaceGroup, emit_seen};
 use super::tiles::Tile;
 use crate::accel::{Accel, LaneMask};
-use crate::light_mesh::{DirectMesh, LANES, LightTable, Scratch, VisibilityBits, expand_bits};
+use crate::light_mesh::{DirectMesh, LANES, Scratch, VisibilityBits};
 
 /// Squares of a tile, one bit each.
 type SquareMask = u64;
@@ -159,22 +159,4 @@ pub(super) fn shade_hybrid<A: Accel>(
     }
     emit_seen(lights, vertices, &seen, emit);
     rays
-}
-
-/// Calls `emit(vertex, I)` with the light of the lights whose bits are set, a row of bits per vertex.
-#[inline(always)]
-pub(super) fn emit_seen(
-    lights: &LightTable,
-    vertices: &[PathVertex],
-    seen: &[VisibilityBits],
-    emit: &mut dyn FnMut(&PathVertex, Vec3),
-) {
-    let chunks = lights.chunks().len();
-    for (number, vertex) in vertices.iter().enumerate() {
-        let bits = &seen[number * chunks..][..chunks];
-        emit(
-            vertex,
-            lights.illuminate(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk]))),
-        );
-    }
 }

@@ -1,9 +1,10 @@
 //! Neighbouring surface points whose occlusion rays travel together.
 
-use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::light_mesh::{LANES, LightChunk};
+use glam::Vec3;
 
 use super::paths::PathVertex;
+use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
+use crate::light_mesh::{LANES, LightChunk, LightTable, VisibilityBits, expand_bits};
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for
 /// neighbouring points.
@@ -59,5 +60,23 @@ impl SurfaceGroup {
     pub fn seeing<A: Accel>(&mut self, accel: &A, points: LaneMask) -> LaneMask {
         self.packet.tfar = [1.0; LANES];
         points & !accel.occluded_packet(points, &mut self.packet, Coherence::Coherent)
+    }
+}
+
+/// Calls `emit(vertex, I)` with the light of the lights whose bits are set, a row of bits per vertex.
+#[inline(always)]
+pub(super) fn emit_seen(
+    lights: &LightTable,
+    vertices: &[PathVertex],
+    seen: &[VisibilityBits],
+    emit: &mut dyn FnMut(&PathVertex, Vec3),
+) {
+    let chunks = lights.chunks().len();
+    for (number, vertex) in vertices.iter().enumerate() {
+        let bits = &seen[number * chunks..][..chunks];
+        emit(
+            vertex,
+            lights.illuminate(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk]))),
+        );
     }
 }
