@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::Vec3;
 use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::scene::load::{LoadError, LoadedScene, load_scene_file};
-use lightmesh::scene::{Falloff, TriangleMaterials};
+use lightmesh::scene::{Falloff, LightShape, TriangleMaterials};
 use lightmesh::settings::{
     Estimator, IndirectForm, Integrator, Leaks, Neighbourhood, Normalization, PointLayout, Radius, Resolve,
     Spacing,
@@ -330,6 +330,34 @@ fn random_lights_follow_the_documented_generator() {
     let first = scene.scene.lights[0];
     assert_eq!(first.position, Vec3::new(unit(0xe220a8), unit(0x6e789e), unit(0x06c45d)));
     assert_eq!((scene.scene.lights.len(), first.intensity), (2, Vec3::splat(1.5)));
+}
+
+/// Each channel of each light gets a factor of its own in [1 − v, 1 + v).
+#[test]
+fn random_lights_vary_in_colour_within_the_range() {
+    let lights = |variation: &str| {
+        let table = "[[light_box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\ncount = 200\nintensity = 2\n";
+        loaded(&format!("{table}{variation}")).scene.lights
+    };
+    assert!(lights("").iter().all(|light| light.intensity == Vec3::splat(2.0)));
+    let varied = lights("color_variation = 0.25");
+    let channels: Vec<f32> = varied.iter().flat_map(|light| light.intensity.to_array()).collect();
+    assert!(channels.iter().all(|channel| (1.5..2.5).contains(channel)), "{channels:?}");
+    let (least, most) = channels.iter().fold((f32::MAX, 0.0f32), |(a, b), &c| (a.min(c), b.max(c)));
+    assert!(least < 1.6 && most > 2.4, "600 factors reach from {least} to {most}");
+    assert!(varied.iter().any(|light| light.intensity.x != light.intensity.y), "channels vary on their own");
+}
+
+/// A light with a position and a direction is a spot light whose cone angles count from the direction.
+#[test]
+fn spot_lights_have_their_cones() {
+    let table = "[[light]]\nposition = [0, 3, 0]\ndirection = [0, -2, 0]\ncone = [30, 60]\nintensity = 1";
+    let LightShape::Spot { direction, inner_cosine, outer_cosine } = loaded(table).scene.lights[0].shape
+    else {
+        panic!("no spot light");
+    };
+    assert_eq!(direction, Vec3::NEG_Y);
+    assert!((inner_cosine - 0.75f32.sqrt()).abs() < 1e-6 && (outer_cosine - 0.5).abs() < 1e-6);
 }
 
 #[test]
