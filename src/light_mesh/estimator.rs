@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use super::direct::{Basis, DirectValues};
 use super::directional;
 use super::leaks::{amounts_differ, is_inside, keep_visible, lights_differ};
-use super::lights::{LANES, Lanes, LightTable, VisibilityBits};
+use super::lights::{LANES, Lanes, LightTable, VisibilityBits, horizontal_sum};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
-use super::store::PointMask;
-use super::vicinity::Vicinity;
+use super::store::{PointMask, UNKNOWN};
+use super::vicinity::{Group, Vicinity};
 use crate::accel::Accel;
 use crate::scene::{Scene, SurfacePoint};
 use crate::settings::{Estimator, Leaks, LightMeshSettings};
@@ -145,6 +145,81 @@ impl DirectMesh {
                 }
                 directional::irradiance(&sums, surface.shading_normal) * scale
             }
+        }
+    }
+
+    /// [`DirectMesh::illumination`] of a surface point that is one of several in a row of the same normal.
+    ///
+    /// They differ in the weights of the mesh points only, so that `directional` needs what each mesh point gives to
+    /// that normal just once.
+    #[inline(always)]
+    pub fn illumination_in_row<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut Scratch,
+    ) -> Vec3 {
+        if self.estimator == Estimator::Directional
+            && let Some(light) = self.directional_in_row(surface, scratch)
+        {
+            return light;
+        }
+        self.illumination(accel, surface, scratch)
+    }
+
+    /// The estimate `directional`; `None` where D_y is empty, or has to be looked at more closely.
+    #[inline(always)]
+    fn directional_in_row(&self, surface: &SurfacePoint, scratch: &mut Scratch) -> Option<Vec3> {
+        let (ball, around) = self.points.around(surface, scratch.vicinity.as_mut()?, |_| {})?;
+        if *around.normal != surface.shading_normal {
+            *around.normal = surface.shading_normal;
+            around.groups.iter_mut().for_each(|group| self.light_up(group, surface.shading_normal));
+        }
+        let mut sums = [[0.0f32; LANES]; 4];
+        let (mut least, mut most) = ([f32::INFINITY; LANES], [0.0f32; LANES]);
+        for group in around.groups {
+            let (weights, _) = group.weigh(&ball);
+            let [r, g, b] = &group.lit;
+            for lane in 0..LANES {
+                // Points that don't count are marked by an amount below 0.
+                let amount = group.amount[lane];
+                let counts = amount >= 0.0 && weights[lane] > 0.0;
+                let weight = if counts { weights[lane] } else { 0.0 };
+                sums[0][lane] += weight * r[lane];
+                sums[1][lane] += weight * g[lane];
+                sums[2][lane] += weight * b[lane];
+                sums[3][lane] += weight;
+                let (low, high) = if counts { (amount, amount) } else { (f32::INFINITY, 0.0) };
+                least[lane] = if low < least[lane] { low } else { least[lane] };
+                most[lane] = if high > most[lane] { high } else { most[lane] };
+            }
+        }
+        let [r, g, b, total] = sums.map(|sum| horizontal_sum(&sum));
+        let differ = self.points.leaks() == Leaks::Visibility && {
+            let least = least.iter().copied().fold(f32::INFINITY, f32::min);
+            let most = most.iter().copied().fold(0.0, f32::max);
+            amounts_differ([least, most].into_iter())
+        };
+        (total > 0.0 && !differ).then(|| Vec3::new(r, g, b).max(Vec3::ZERO) / total)
+    }
+
+    /// Notes what the points of a group give to a normal.
+    #[inline(always)]
+    fn light_up(&self, group: &mut Group, normal: Vec3) {
+        let monomials = directional::monomials(normal);
+        for lane in 0..LANES {
+            let slot = group.slots[lane];
+            group.amount[lane] = -1.0;
+            if slot == UNKNOWN || self.inside.get(slot as usize).is_some_and(|&inside| inside) {
+                continue;
+            }
+            let mut light = Vec4::ZERO;
+            let values = self.values.values::<{ directional::STRIDE }>(slot);
+            for (value, monomial) in values.as_chunks::<4>().0.iter().zip(monomials) {
+                light += Vec4::from_array(*value) * monomial;
+            }
+            (0..3).for_each(|channel| group.lit[channel][lane] = light[channel]);
+            group.amount[lane] = self.values.amount(slot);
         }
     }
 

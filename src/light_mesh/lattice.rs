@@ -89,6 +89,22 @@ impl Lattice {
         (brick * 64 + place) as u64
     }
 
+    /// Calls `each(id, position)` for all points of a box, and perhaps some beside it, in the order of
+    /// [`gather`](Self::gather).
+    pub fn for_each_in_box(&self, min: Vec3, max: Vec3, mut each: impl FnMut(u64, Vec3)) {
+        let last_cell = self.bricks * EDGE - 1;
+        let cell_of = |p: Vec3| ((p - self.origin) * self.inverse_spacing).floor().as_i64vec3();
+        let (first, last) = (cell_of(min).max(I64Vec3::ZERO), cell_of(max).min(last_cell));
+        for z in first.z..=last.z {
+            for y in first.y..=last.y {
+                for x in first.x..=last.x {
+                    let cell = I64Vec3::new(x, y, z);
+                    each(self.id(cell), self.at(cell));
+                }
+            }
+        }
+    }
+
     /// The points of the ball, in ascending order of z, y, x.
     #[inline(always)]
     pub fn gather(&self, ball: &Ball, out: &mut Neighbours) {

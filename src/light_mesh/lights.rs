@@ -284,13 +284,16 @@ pub fn expand_bits(bits: VisibilityBits) -> Lanes {
 /// Sum of all lanes, always in the same order.
 #[inline(always)]
 pub fn horizontal_sum(lanes: &Lanes) -> f32 {
-    let mut folded = *lanes;
-    for width in [8, 4, 2, 1] {
-        for lane in 0..width {
-            folded[lane] += folded[lane + width];
-        }
+    // Written out: compilers keep a loop over widths, with a loop over single lanes within it.
+    let mut half = [0.0; LANES / 2];
+    for lane in 0..LANES / 2 {
+        half[lane] = lanes[lane] + lanes[lane + LANES / 2];
     }
-    folded[0]
+    let mut quarter = [0.0; LANES / 4];
+    for lane in 0..LANES / 4 {
+        quarter[lane] = half[lane] + half[lane + LANES / 4];
+    }
+    (quarter[0] + quarter[2]) + (quarter[1] + quarter[3])
 }
 
 #[cfg(test)]

@@ -44,6 +44,13 @@ impl Ball {
         }
     }
 
+    /// The same ball around another centre, whole or cut.
+    #[inline(always)]
+    pub fn around(&self, center: Vec3, normal: Option<Vec3>) -> Self {
+        let height = if normal.is_some() { 0.0 } else { f32::MAX };
+        Self { center, normal: normal.unwrap_or(Vec3::ZERO), height, ..*self }
+    }
+
     /// Whether a point is on the admitted side of the plane.
     #[inline(always)]
     pub fn admits(&self, point: Vec3) -> bool {

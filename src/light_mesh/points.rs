@@ -7,7 +7,7 @@ use super::neighbours::{Ball, Neighbours};
 use super::scattered::ScatteredPoints;
 use super::store::{NeededPoints, PointMask, SlotTable, UNKNOWN};
 use super::tiled::{TileLayout, TiledPoints};
-use super::vicinity::{Group, Vicinity};
+use super::vicinity::{Group, Surroundings, Vicinity};
 use crate::scene::{Bounds, SurfacePoint};
 use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Spacing};
 
@@ -56,6 +56,11 @@ struct Layer {
     bounds: Option<Bounds>,
     points: PointSet,
     radius: f32,
+    /// The ball of this radius, around any point.
+    ball: Ball,
+    /// Side of the cubes whose surface points share a search for mesh points, and 1 over it; `None` where D_y is no
+    /// ball, or where coordinates are so large that they hardly tell cubes apart.
+    cubes: Option<(f32, f32)>,
     /// Id of its first point; a multiple of 64.
     first_id: u64,
 }
@@ -72,8 +77,8 @@ pub struct MeshPoints {
     pub counters: PointCounters,
 }
 
-/// Side of the cubes whose surface points share a search for mesh points, in units of R: smaller ones are met by fewer
-/// surface points, larger ones have more points around that most of them don't need.
+/// Side of the cubes in units of R: smaller ones are met by fewer surface points, larger ones have more mesh points around
+/// that most of them don't need.
 const CUBE_SIDE: f32 = 0.3;
 
 /// Cubes are told apart up to this far from the origin, in units of their side.
@@ -100,7 +105,14 @@ impl Layer {
             PointLayout::Jittered { seed } => PointSet::Tiled(tiled(TileLayout::Jittered, *seed)),
             PointLayout::BlueNoise { seed } => PointSet::Tiled(tiled(TileLayout::BlueNoise, *seed)),
         };
-        Ok(Self { bounds: region, points, radius, first_id })
+        let smooth = settings.neighbourhood == Neighbourhood::SmoothSphere;
+        let ball = Ball::new(Vec3::ZERO, None, radius, smooth);
+        let side = CUBE_SIDE * radius;
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element() / side;
+        let shared = settings.neighbourhood != Neighbourhood::Nearest
+            && (bounds.is_empty() || farthest < FARTHEST_CUBE);
+        let cubes = shared.then_some((side, 1.0 / side));
+        Ok(Self { bounds: region, points, radius, ball, cubes, first_id })
     }
 }
 
@@ -203,8 +215,8 @@ impl MeshPoints {
         out: &mut Neighbours,
     ) -> bool {
         out.clear();
-        if let Some((ball, groups)) = self.around(surface, vicinity, |_| {}) {
-            for group in groups {
+        if let Some((ball, around)) = self.around(surface, vicinity, |_| {}) {
+            for group in around.groups {
                 let (weights, lanes) = group.weigh(&ball);
                 out.push_group(group, &weights, lanes);
             }
@@ -227,10 +239,10 @@ impl MeshPoints {
         let mut needed = NeededPoints::default();
         for surface in surfaces {
             let mut found = 0;
-            if let Some((ball, groups)) = self
+            if let Some((ball, around)) = self
                 .around(surface, &mut vicinity, |group| group.needed_ids().for_each(|id| needed.insert(id)))
             {
-                for group in groups {
+                for group in around.groups {
                     let (_, lanes) = group.weigh(&ball);
                     group.needed |= lanes;
                     found |= lanes;
@@ -247,24 +259,19 @@ impl MeshPoints {
 
     /// The ball of a surface point, and all points that may lie in it; `None` where that would be no help.
     #[inline(always)]
-    fn around<'a>(
+    pub(super) fn around<'a>(
         &self,
         surface: &SurfacePoint,
         vicinity: &'a mut Vicinity,
         forget: impl FnMut(&Group),
-    ) -> Option<(Ball, &'a mut [Group])> {
+    ) -> Option<(Ball, Surroundings<'a>)> {
         let number = self.layer_number_at(surface.position);
         let layer = &self.layers[number];
-        let side = CUBE_SIDE * layer.radius;
-        let place = (surface.position * side.recip()).floor();
-        // Where coordinates can hardly tell cubes apart, cubes say nothing about their points.
-        let countable = place.abs().max_element() < FARTHEST_CUBE;
-        if self.neighbourhood == Neighbourhood::Nearest || !countable {
-            return None;
-        }
+        let (side, inverse) = layer.cubes?;
+        let place = (surface.position * inverse).floor();
         let cube = (number as u32, place.as_ivec3());
-        let groups = vicinity.around(cube, |each| self.surround(layer, place, side, each), forget);
-        Some((self.ball_in(layer, surface), groups))
+        let around = vicinity.around(cube, |each| self.surround(layer, place, side, each), forget);
+        Some((self.ball_in(layer, surface), around))
     }
 
     /// Calls `each(id, slot, position)` for the points that may lie in the ball of some point in a cube.
@@ -273,18 +280,13 @@ impl MeshPoints {
         // What rounding may add to R, generously.
         let slack = 1e-4 * layer.radius + 16.0 * f32::EPSILON * center.abs().max_element();
         let reach = layer.radius + slack;
-        let ball = Ball::new(center, None, reach + 0.5 * 3f32.sqrt() * side, false);
-        let mut found = Neighbours::default();
-        with_set!(&layer.points, set => {
-            set.gather(&ball, &mut found);
-            for &id in found.ids() {
-                let position = set.position(id);
-                let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
-                if beside.length_squared() < reach * reach {
-                    each(layer.first_id + id, self.table.slot(layer.first_id + id), position);
-                }
+        let half = Vec3::splat(0.5 * side + reach);
+        with_set!(&layer.points, set => set.for_each_in_box(center - half, center + half, |id, position| {
+            let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
+            if beside.length_squared() < reach * reach {
+                each(layer.first_id + id, self.table.slot(layer.first_id + id), position);
             }
-        });
+        }));
     }
 
     /// Region of space whose points make up D_y of a surface point, unless the neighbourhood is the nearest point.
@@ -295,8 +297,7 @@ impl MeshPoints {
     #[inline(always)]
     fn ball_in(&self, layer: &Layer, surface: &SurfacePoint) -> Ball {
         let normal = self.hemisphere.then_some(surface.geometric_normal);
-        let smooth = self.neighbourhood == Neighbourhood::SmoothSphere;
-        Ball::new(surface.position, normal, layer.radius, smooth)
+        layer.ball.around(surface.position, normal)
     }
 
     /// Position of a point.

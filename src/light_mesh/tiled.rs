@@ -109,6 +109,12 @@ impl TiledPoints {
         }
     }
 
+    /// Calls `each(id, position)` for all points of a box, and some beside it, in the order of [`gather`](Self::gather).
+    pub fn for_each_in_box(&self, min: Vec3, max: Vec3, each: impl FnMut(u64, Vec3)) {
+        let cell_of = |p: Vec3| ((p - self.origin) * self.inverse_spacing).floor().as_i64vec3();
+        self.for_each_in_cells(cell_of(min), cell_of(max), each);
+    }
+
     /// The points of the ball, in a fixed order.
     #[inline(always)]
     pub fn gather(&self, ball: &Ball, out: &mut Neighbours) {

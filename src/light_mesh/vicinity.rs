@@ -3,10 +3,13 @@
 //! The surface points of a tile lie close together, so that searching for the D_y of each would find the same mesh points
 //! again and again. Here a search is made per cube, and a surface point costs one weighing of sixteen points at a time.
 
+use std::ops::Range;
+
 use glam::{IVec3, Vec3};
 
 use super::lights::{LANES, Lanes};
 use super::neighbours::Ball;
+use super::store::UNKNOWN;
 
 /// Cubes and groups of candidates that are kept before all are forgotten: some megabytes per thread.
 const MOST_CUBES: usize = 1 << 9;
@@ -23,12 +26,22 @@ pub struct Group {
     pub slots: [u32; LANES],
     /// Those that were asked for.
     pub needed: u16,
+    /// What the points give to a normal, see [`Surroundings::normal`]: RGB, and what they are compared by.
+    pub lit: [Lanes; 3],
+    /// See above.
+    pub amount: Lanes,
 }
 
 impl Group {
     /// A group of no points: their places are so far away that they weigh nothing.
-    const EMPTY: Self =
-        Self { position: [[f32::MAX; LANES]; 3], ids: [0; LANES], slots: [0; LANES], needed: 0 };
+    const EMPTY: Self = Self {
+        position: [[f32::MAX; LANES]; 3],
+        ids: [0; LANES],
+        slots: [UNKNOWN; LANES],
+        needed: 0,
+        lit: [[0.0; LANES]; 3],
+        amount: [0.0; LANES],
+    };
 
     /// Ids of the points that were asked for.
     pub fn needed_ids(&self) -> impl Iterator<Item = u64> + '_ {
@@ -58,21 +71,39 @@ fn that_count(weights: &Lanes) -> u16 {
     for lane in 0..LANES {
         bits[lane] = (weights[lane].to_bits() >> 29 & 1) << lane;
     }
-    for width in [8, 4, 2, 1] {
-        for lane in 0..width {
-            bits[lane] |= bits[lane + width];
-        }
+    let mut half = [0; LANES / 2];
+    for lane in 0..LANES / 2 {
+        half[lane] = bits[lane] | bits[lane + LANES / 2];
     }
-    bits[0] as u16
+    let mut quarter = [0; LANES / 4];
+    for lane in 0..LANES / 4 {
+        quarter[lane] = half[lane] | half[lane + LANES / 4];
+    }
+    (quarter[0] | quarter[1] | quarter[2] | quarter[3]) as u16
 }
 
 /// A cube of space: the layer of mesh points that holds there, and its place in units of its side.
 pub type Cube = (u32, IVec3);
 
+/// The mesh points around a cube.
+pub struct Surroundings<'a> {
+    /// The points, in a fixed order.
+    pub groups: &'a mut [Group],
+    /// The normal that the groups' `lit` is for; NaN to begin with.
+    pub normal: &'a mut Vec3,
+}
+
+/// A cube that was met, its groups, and [`Surroundings::normal`].
+struct KnownCube {
+    cube: Cube,
+    groups: Range<usize>,
+    normal: Vec3,
+}
+
 /// The cubes that were met, with the mesh points around each.
 #[derive(Default)]
 pub struct Vicinity {
-    cubes: Vec<(Cube, u32, u32)>,
+    cubes: Vec<KnownCube>,
     /// From hashes of cubes to their numbers plus one; a power of two of them, at most half in use.
     table: Vec<u32>,
     groups: Vec<Group>,
@@ -89,12 +120,12 @@ impl Vicinity {
         cube: Cube,
         surround: impl FnOnce(&mut dyn FnMut(u64, u32, Vec3)),
         forget: impl FnMut(&Group),
-    ) -> &mut [Group] {
-        if self.cubes.get(self.current).is_none_or(|&(found, ..)| found != cube) {
+    ) -> Surroundings<'_> {
+        if self.cubes.get(self.current).is_none_or(|known| known.cube != cube) {
             self.turn_to(cube, surround, forget);
         }
-        let (_, first, end) = self.cubes[self.current];
-        &mut self.groups[first as usize..end as usize]
+        let known = &mut self.cubes[self.current];
+        Surroundings { groups: &mut self.groups[known.groups.clone()], normal: &mut known.normal }
     }
 
     /// All groups.
@@ -126,7 +157,7 @@ impl Vicinity {
         loop {
             match self.table[at] {
                 0 => break,
-                number if self.cubes[number as usize - 1].0 == cube => {
+                number if self.cubes[number as usize - 1].cube == cube => {
                     self.current = number as usize - 1;
                     return;
                 }
@@ -147,7 +178,7 @@ impl Vicinity {
             }
             lane += 1;
         });
-        self.cubes.push((cube, first as u32, self.groups.len() as u32));
+        self.cubes.push(KnownCube { cube, groups: first..self.groups.len(), normal: Vec3::NAN });
         self.current = self.cubes.len() - 1;
         self.table[at] = self.cubes.len() as u32;
     }

@@ -68,8 +68,17 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         {
             counters.shadow_rays = shade_hybrid(*accel, &meshes.direct, tile, vertices, &mut scratch, light);
         } else {
-            for (vertex, light) in vertices.iter().zip(&mut *light) {
-                *light = meshes.direct.illumination(*accel, &vertex.surface, &mut scratch);
+            let mut before = Vec3::NAN;
+            for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {
+                let surface = &vertex.surface;
+                let normal = surface.shading_normal;
+                let after = vertices.get(number + 1).map_or(Vec3::NAN, |next| next.surface.shading_normal);
+                *light = if normal == before || normal == after {
+                    meshes.direct.illumination_in_row(*accel, surface, &mut scratch)
+                } else {
+                    meshes.direct.illumination(*accel, surface, &mut scratch)
+                };
+                before = normal;
             }
         }
         counters.shadow_rays += scratch.rays;
