@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use divan::{Bencher, black_box};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayPacket};
 use lightmesh::light_mesh::{
     Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
@@ -19,6 +19,8 @@ use lightmesh::scene::{
     TriangleMesh,
 };
 use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};
+use lightmesh::simd::vectorize;
+use pulp::NullaryFnOnce;
 
 fn main() {
     divan::main();
@@ -90,7 +92,7 @@ fn point_settings(spacings: f32) -> PointSettings {
     }
 }
 
-/// Finding D_y.
+/// Finding D_y by a search for each surface point.
 #[divan::bench(args = [1.5, 3.0])]
 fn gather(bencher: Bencher, spacings: f32) {
     let points = MeshPoints::new(scene(1).bounds(), &point_settings(spacings)).expect("a modest grid");
@@ -104,22 +106,61 @@ fn gather(bencher: Bencher, spacings: f32) {
     });
 }
 
+/// Finding the points of all D_y, by a search for each cube.
+#[divan::bench(args = [1.5, 3.0])]
+fn needed(bencher: Bencher, spacings: f32) {
+    let points = MeshPoints::new(scene(1).bounds(), &point_settings(spacings)).expect("a modest grid");
+    let surfaces = surfaces();
+    bencher
+        .counter(SURFACES)
+        .bench_local(|| vectorize(Needed { points: &points, surfaces: black_box(&surfaces) }));
+}
+
+struct Needed<'a> {
+    points: &'a MeshPoints,
+    surfaces: &'a [SurfacePoint],
+}
+
+impl NullaryFnOnce for Needed<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn call(self) -> usize {
+        self.points.needed(self.surfaces.iter()).len()
+    }
+}
+
 /// Σ E φ2/φ1 over the lights.
 #[divan::bench(args = [16, 100, 1000])]
 fn illuminate(bencher: Bencher, lights: usize) {
     let scene = scene(lights);
     let table = LightTable::of_scene(&scene);
     let surfaces = surfaces();
-    bencher.counter(SURFACES).bench_local(|| {
-        let light = |surface| table.illuminate(black_box(surface), |_| Some([1.0; LANES]));
-        pulp::Arch::new().dispatch(|| surfaces.iter().map(light).sum::<Vec3>())
-    });
+    bencher.counter(SURFACES).bench_local(|| vectorize(Illuminate { table: &table, surfaces: &surfaces }));
+}
+
+struct Illuminate<'a> {
+    table: &'a LightTable,
+    surfaces: &'a [SurfacePoint],
+}
+
+impl NullaryFnOnce for Illuminate<'_> {
+    type Output = Vec3;
+
+    #[inline(always)]
+    fn call(self) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for surface in self.surfaces {
+            sum += self.table.illuminate(black_box(surface), |_| Some([1.0; LANES]));
+        }
+        sum
+    }
 }
 
 /// Irradiance of a normal from the directional basis.
 #[divan::bench]
 fn irradiance(bencher: Bencher) {
-    let coefficients = [0.1; directional::STRIDE];
+    let coefficients = [Vec4::splat(0.1); directional::COEFFICIENTS];
     let surfaces = surfaces();
     bencher.counter(SURFACES).bench_local(|| {
         let light = |surface: &SurfacePoint| {
@@ -158,12 +199,30 @@ fn shade(bencher: Bencher, estimator: Estimator) {
         neighbours.ids().iter().for_each(|&id| needed.insert(id));
     }
     mesh.evaluate(&accel, &scene, &PointMask::union(needed.into_bricks()));
-    let mut scratch = Scratch::default();
+    let mut scratch = Scratch::for_tile();
     bencher.counter(SURFACES).bench_local(|| {
-        pulp::Arch::new().dispatch(|| {
-            surfaces.iter().map(|surface| mesh.illumination(&accel, surface, &mut scratch)).sum::<Vec3>()
-        })
+        vectorize(Shade { mesh: &mesh, accel: &accel, surfaces: &surfaces, scratch: &mut scratch })
     });
+}
+
+struct Shade<'a> {
+    mesh: &'a DirectMesh,
+    accel: &'a BvhAccel,
+    surfaces: &'a [SurfacePoint],
+    scratch: &'a mut Scratch,
+}
+
+impl NullaryFnOnce for Shade<'_> {
+    type Output = Vec3;
+
+    #[inline(always)]
+    fn call(self) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for surface in self.surfaces {
+            sum += self.mesh.illumination(self.accel, surface, self.scratch);
+        }
+        sum
+    }
 }
 
 /// One packet from neighbouring points towards one light.

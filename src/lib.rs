@@ -12,3 +12,4 @@ pub mod light_mesh;
 pub mod render;
 pub mod scene;
 pub mod settings;
+pub mod simd;

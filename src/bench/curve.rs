@@ -40,7 +40,7 @@ impl Sizes {
             Self { error_side: 16, time_side: 32, reference_samples: 16, spacings, radii }
         } else {
             let spacings = &[0.75, 0.6, 0.5, 0.4, 0.3, 0.25];
-            Self { error_side: 100, time_side: 600, reference_samples: 256, spacings, radii: &[0.75, 1.5] }
+            Self { error_side: 64, time_side: 600, reference_samples: 128, spacings, radii: &[0.75, 1.5] }
         }
     }
 }
@@ -143,9 +143,8 @@ fn attempt(
 ) -> Result<Tried, BenchError> {
     let settings = |side| -> Settings { configuration.settings(&setup.settings, (side, side)) };
     let film = setup.frame(backend, &settings(sizes.error_side))?.film;
-    // Three frames: the first one also warms the caches up.
     let times: Result<Vec<f64>, _> =
-        (0..3).map(|_| setup.frame(backend, &settings(sizes.time_side)).map(|frame| frame.seconds)).collect();
+        (0..2).map(|_| setup.frame(backend, &settings(sizes.time_side)).map(|frame| frame.seconds)).collect();
     let seconds = report.record(format!("curve: {configuration}"), times?);
     Ok(Tried {
         own_error: relative_rmse(&film, own)?,

@@ -33,14 +33,17 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
 
     let variants = [Basis::Bits, Basis::Scalar, Basis::Directional];
     let times = with_accel!(&backend, accel => {
-        options.budget().alternate(variants.len() + 2, |variant| {
+        options.budget().alternate(variants.len() + 3, |variant| {
             let (seconds, _) = match variants.get(variant) {
                 Some(&basis) => {
                     let mut values = DirectValues::default();
                     timed(|| values.evaluate(accel, &table, basis, &points))
                 }
                 None if variant == variants.len() => {
-                    timed(|| points_to_one_light(accel, &points, &setup.scene.lights))
+                    timed(|| points_to_one_light(accel, &points, &setup.scene.lights, Coherence::Incoherent))
+                }
+                None if variant == variants.len() + 1 => {
+                    timed(|| points_to_one_light(accel, &points, &setup.scene.lights, Coherence::Coherent))
                 }
                 None => timed(|| one_point_to_lights(accel, &points, &setup.scene.lights)),
             };
@@ -53,6 +56,7 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
         "evaluate, DirectLight (scalar)",
         "evaluate, DirectLight (directional)",
         "bare: 16 points towards one light",
+        "bare: 16 points towards one light, as one",
         "bare: one point towards 16 lights",
     ];
     let medians: Vec<f64> =
@@ -94,7 +98,12 @@ fn mesh_points(scene: &Scene, bricks: u64) -> Result<Vec<Vec3>, BenchError> {
 }
 
 /// Traces from packets of neighbouring points towards one light after the other; returns the blocked rays.
-fn points_to_one_light<A: Accel>(accel: &A, points: &[Vec3], lights: &[PointLight]) -> u64 {
+fn points_to_one_light<A: Accel>(
+    accel: &A,
+    points: &[Vec3],
+    lights: &[PointLight],
+    coherence: Coherence,
+) -> u64 {
     let group = |points: &[Vec3]| {
         let mut blocked = 0;
         let active = ((1u64 << points.len()) - 1) as u32;
@@ -103,7 +112,7 @@ fn points_to_one_light<A: Accel>(accel: &A, points: &[Vec3], lights: &[PointLigh
             for (lane, &point) in points.iter().enumerate() {
                 packet.set_lane(lane, &Ray::between(point, light.position));
             }
-            let lanes = accel.occluded_packet(active, &mut packet, Coherence::Coherent) & active;
+            let lanes = accel.occluded_packet(active, &mut packet, coherence) & active;
             blocked += u64::from(lanes.count_ones());
         }
         blocked

@@ -1,14 +1,17 @@
 //! The direct light mesh (DLM): visibility of every light from mesh points, eq. (1).
 
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use glam::Vec3;
+use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 use super::directional::{self, COEFFICIENTS};
-use super::lights::{LANES, LightTable, VisibilityBits, expand_bits, horizontal_sum};
+use super::lights::{LANES, Lanes, LightTable, SeenFromPoint, VisibilityBits, expand_bits, horizontal_sum};
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::settings::Estimator;
+use crate::simd::vectorize;
 
 /// What is kept per mesh point beside the visibility bits, as the estimator demands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,8 +105,10 @@ impl DirectValues {
         let bits = &self.bits[first..];
         match basis {
             Basis::Bits => {}
-            Basis::Scalar => derive(lights, points, bits, values, direct_light),
-            Basis::Directional => derive(lights, points, bits, values, irradiance_by_normal),
+            Basis::Scalar => derive::<DirectLight, 6>(lights, points, bits, values),
+            Basis::Directional => {
+                derive::<IrradianceByNormal, { directional::STRIDE }>(lights, points, bits, values)
+            }
         }
         let values = &self.values[first_value..];
         match basis {
@@ -144,7 +149,8 @@ fn see_lights<A: Accel>(accel: &A, lights: &LightTable, points: &[Vec3], bits: &
             }
             // The query leaves −∞ in blocked lanes.
             packet.tfar = [1.0; LANES];
-            let blocked = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+            // Points are far enough apart for their rays to part soon: as one, they would all visit what any of them does.
+            let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
             visible[light] = (active & !blocked) as VisibilityBits;
         }
         // From points per light to lights per point.
@@ -158,13 +164,20 @@ fn see_lights<A: Accel>(accel: &A, lights: &LightTable, points: &[Vec3], bits: &
     }
 }
 
-/// Fills the `N` values per point that follow from the visibility bits without a ray.
-fn derive<const N: usize>(
+/// Values of a mesh point that follow from its visibility bits without a ray.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+trait Derived<const N: usize> {
+    /// The values of the point at `x`.
+    fn at(lights: &LightTable, x: Vec3, bits: &[VisibilityBits]) -> [f32; N];
+}
+
+/// Fills the `N` values per point.
+fn derive<D: Derived<N>, const N: usize>(
     lights: &LightTable,
     points: &[Vec3],
     bits: &[VisibilityBits],
     values: &mut [f32],
-    of_point: impl Fn(&LightTable, Vec3, &[VisibilityBits]) -> [f32; N] + Sync,
 ) {
     const POINTS: usize = 64;
     let chunks = lights.chunks().len();
@@ -173,13 +186,29 @@ fn derive<const N: usize>(
         .zip(bits.par_chunks(chunks * POINTS))
         .zip(points.par_chunks(POINTS))
         .for_each(|((values, bits), points)| {
-            pulp::Arch::new().dispatch(|| {
-                let values = values.chunks_exact_mut(N);
-                for ((value, bits), &x) in values.zip(bits.chunks_exact(chunks)).zip(points) {
-                    value.copy_from_slice(&of_point(lights, x, bits));
-                }
-            });
+            vectorize(Derive::<D, N> { lights, points, bits, values, which: PhantomData });
         });
+}
+
+/// Some points of [`derive`], as work for the best instruction set.
+struct Derive<'a, D, const N: usize> {
+    lights: &'a LightTable,
+    points: &'a [Vec3],
+    bits: &'a [VisibilityBits],
+    values: &'a mut [f32],
+    which: PhantomData<D>,
+}
+
+impl<D: Derived<N>, const N: usize> NullaryFnOnce for Derive<'_, D, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let bits = self.bits.chunks_exact(self.lights.chunks().len());
+        for ((value, bits), &x) in self.values.chunks_exact_mut(N).zip(bits).zip(self.points) {
+            value.copy_from_slice(&D::at(self.lights, x, bits));
+        }
+    }
 }
 
 /// Places of the set bits; chunks are filled from lane 0 on.
@@ -188,52 +217,83 @@ fn lanes_of(used: VisibilityBits) -> Range<usize> {
 }
 
 /// DirectLight(x) of eq. (1), and the same with V = 1: RGB and RGB.
-#[inline(always)]
-fn direct_light(lights: &LightTable, x: Vec3, bits: &[VisibilityBits]) -> [f32; 6] {
-    let mut sums = [[0.0f32; LANES]; 6];
-    lights.for_each_chunk_from(x, |index, _, reciprocal| {
-        let visible = expand_bits(bits[index]);
-        for channel in 0..3 {
-            let intensity = &lights.chunks()[index].intensity[channel];
+struct DirectLight<'a> {
+    lights: &'a LightTable,
+    bits: &'a [VisibilityBits],
+    sums: [Lanes; 6],
+}
+
+impl Derived<6> for DirectLight<'_> {
+    #[inline(always)]
+    fn at(lights: &LightTable, x: Vec3, bits: &[VisibilityBits]) -> [f32; 6] {
+        let mut light = DirectLight { lights, bits, sums: [[0.0; LANES]; 6] };
+        lights.see_from(x, &mut light);
+        light.sums.map(|sum| horizontal_sum(&sum))
+    }
+}
+
+impl SeenFromPoint for DirectLight<'_> {
+    #[inline(always)]
+    fn chunk(&mut self, index: usize, _: &[Lanes; 3], reciprocal: &Lanes) {
+        let visible = expand_bits(self.bits[index]);
+        let (seen, unoccluded) = self.sums.split_at_mut(3);
+        let intensities = &self.lights.chunks()[index].intensity;
+        for ((seen, unoccluded), intensity) in seen.iter_mut().zip(unoccluded).zip(intensities) {
             for lane in 0..LANES {
-                let unoccluded = intensity[lane] * reciprocal[lane];
-                sums[channel][lane] += visible[lane] * unoccluded;
-                sums[channel + 3][lane] += unoccluded;
+                let light = intensity[lane] * reciprocal[lane];
+                seen[lane] += visible[lane] * light;
+                unoccluded[lane] += light;
             }
         }
-    });
-    sums.map(|sum| horizontal_sum(&sum))
+    }
 }
 
 /// Irradiance by normal at x: Σ_i V_i E_i/φ1 times the cosine lobe of light i's direction.
-#[inline(always)]
-fn irradiance_by_normal(lights: &LightTable, x: Vec3, bits: &[VisibilityBits]) -> [f32; directional::STRIDE] {
-    let mut sums = [[0.0f32; LANES]; 3 * COEFFICIENTS];
-    lights.for_each_chunk_from(x, |index, direction, reciprocal| {
-        if bits[index] == 0 {
+struct IrradianceByNormal<'a> {
+    lights: &'a LightTable,
+    bits: &'a [VisibilityBits],
+    sums: [[Lanes; COEFFICIENTS]; 3],
+}
+
+impl Derived<{ directional::STRIDE }> for IrradianceByNormal<'_> {
+    #[inline(always)]
+    fn at(lights: &LightTable, x: Vec3, bits: &[VisibilityBits]) -> [f32; directional::STRIDE] {
+        let mut irradiance = IrradianceByNormal { lights, bits, sums: [[[0.0; LANES]; COEFFICIENTS]; 3] };
+        lights.see_from(x, &mut irradiance);
+        let mut coefficients = [0.0; directional::STRIDE];
+        for (channel, sums) in irradiance.sums.iter().enumerate() {
+            for (coefficient, sum) in coefficients.chunks_exact_mut(4).zip(sums) {
+                coefficient[channel] = horizontal_sum(sum);
+            }
+        }
+        coefficients
+    }
+}
+
+impl SeenFromPoint for IrradianceByNormal<'_> {
+    #[inline(always)]
+    fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
+        if self.bits[index] == 0 {
             return;
         }
-        let visible = expand_bits(bits[index]);
+        let visible = expand_bits(self.bits[index]);
         let mut lobe = [[0.0f32; LANES]; COEFFICIENTS];
         for lane in 0..LANES {
-            let one = directional::cosine_lobe(direction.map(|axis| axis[lane]));
+            let one = directional::cosine_lobe([direction[0][lane], direction[1][lane], direction[2][lane]]);
             for (coefficient, value) in lobe.iter_mut().zip(one) {
                 coefficient[lane] = value;
             }
         }
-        for channel in 0..3 {
-            let intensity = &lights.chunks()[index].intensity[channel];
-            for (j, coefficient) in lobe.iter().enumerate() {
-                let sum = &mut sums[channel * COEFFICIENTS + j];
+        for (sums, intensity) in self.sums.iter_mut().zip(&self.lights.chunks()[index].intensity) {
+            let mut light = [0.0f32; LANES];
+            for lane in 0..LANES {
+                light[lane] = visible[lane] * intensity[lane] * reciprocal[lane];
+            }
+            for (sum, coefficient) in sums.iter_mut().zip(&lobe) {
                 for lane in 0..LANES {
-                    sum[lane] += visible[lane] * intensity[lane] * reciprocal[lane] * coefficient[lane];
+                    sum[lane] += light[lane] * coefficient[lane];
                 }
             }
         }
-    });
-    let mut coefficients = [0.0; directional::STRIDE];
-    for (coefficient, sum) in coefficients.iter_mut().zip(&sums) {
-        *coefficient = horizontal_sum(sum);
     }
-    coefficients
 }

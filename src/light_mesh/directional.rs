@@ -5,13 +5,14 @@
 //! quadratic polynomial in n. As |n| = 1, its constant can be moved into the squares, which leaves nine
 //! coefficients per colour channel: those of x, y, z, x², y², z², xy, xz, yz.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Coefficients per channel.
 pub const COEFFICIENTS: usize = 9;
 
-/// Numbers kept per mesh point: three channels of coefficients, padded to whole vector registers.
-pub const STRIDE: usize = 32;
+/// Numbers kept per mesh point: coefficient after coefficient, each of three channels and a number without meaning, so
+/// that a coefficient is a vector register.
+pub const STRIDE: usize = 4 * COEFFICIENTS;
 
 /// The coefficients of max(0, n·ω), for n the unit vector ω.
 #[inline(always)]
@@ -39,25 +40,22 @@ pub fn monomials(n: Vec3) -> [f32; COEFFICIENTS] {
     [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z]
 }
 
-/// Irradiance of normal `n` (unit length) from three channels of coefficients. Second order undershoots for
+/// Irradiance of normal `n` (unit length) from coefficients of three channels. Second order undershoots for
 /// normals that face away from a single light, so that it is clamped at 0.
 #[inline(always)]
-pub fn irradiance(coefficients: &[f32; STRIDE], n: Vec3) -> Vec3 {
-    let monomials = monomials(n);
-    let mut channels = [0.0f32; 3];
-    for (c, channel) in channels.iter_mut().enumerate() {
-        for (j, monomial) in monomials.iter().enumerate() {
-            *channel += coefficients[c * COEFFICIENTS + j] * monomial;
-        }
+pub fn irradiance(coefficients: &[Vec4; COEFFICIENTS], n: Vec3) -> Vec3 {
+    let mut channels = Vec4::ZERO;
+    for (coefficient, monomial) in coefficients.iter().zip(monomials(n)) {
+        channels += *coefficient * monomial;
     }
-    Vec3::from_array(channels).max(Vec3::ZERO)
+    channels.truncate().max(Vec3::ZERO)
 }
 
 /// Light from all directions, summed over the channels: the squares' coefficients of a lobe sum to 3/4 whatever its
 /// direction. Up to that factor it is what scalar values hold.
 #[inline(always)]
 pub fn amount(coefficients: &[f32]) -> f32 {
-    coefficients.chunks_exact(COEFFICIENTS).take(3).map(|c| c[3] + c[4] + c[5]).sum()
+    coefficients.as_chunks::<4>().0.iter().skip(3).take(3).map(|c| c[0] + c[1] + c[2]).sum()
 }
 
 #[cfg(test)]
@@ -71,8 +69,7 @@ mod tests {
             let (a, b) = (i as f32 * 0.7, i as f32 * 0.31);
             let w = Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos()).normalize();
             let n = Vec3::new(b.cos(), (a * 1.7).sin(), a.cos()).normalize();
-            let mut coefficients = [0.0; STRIDE];
-            coefficients[..COEFFICIENTS].copy_from_slice(&cosine_lobe(w.to_array()));
+            let coefficients = cosine_lobe(w.to_array()).map(|value| Vec4::new(value, 0.0, 0.0, 0.0));
             let cosine = n.dot(w);
             let exact = 0.25 + 0.5 * cosine + 5.0 / 32.0 * (3.0 * cosine * cosine - 1.0);
             assert!((irradiance(&coefficients, n).x - exact.max(0.0)).abs() < 1e-5);

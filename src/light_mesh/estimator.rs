@@ -1,6 +1,6 @@
 //! Direct illumination of surface points from the direct light mesh: the estimators of spec §4.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::direct::{Basis, DirectValues};
@@ -10,6 +10,7 @@ use super::lights::{LANES, Lanes, LightTable, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::store::PointMask;
+use super::vicinity::Vicinity;
 use crate::accel::Accel;
 use crate::scene::{Scene, SurfacePoint};
 use crate::settings::{Estimator, Leaks, LightMeshSettings};
@@ -30,6 +31,8 @@ pub struct DirectMesh {
 pub struct Scratch {
     /// D_y.
     pub(super) points: Neighbours,
+    /// What surface points that lie close together share; `None` where they come from anywhere.
+    vicinity: Option<Vicinity>,
     /// Occlusion rays traced from surface points to mesh points.
     pub rays: u64,
     /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
@@ -37,6 +40,11 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// For surface points that lie close together. It must not outlive the next evaluation of mesh points.
+    pub fn for_tile() -> Self {
+        Self { vicinity: Some(Vicinity::default()), ..Self::default() }
+    }
+
     /// Finds the points of D_y that count for a surface point; all must be known.
     ///
     /// `inside` tells by slot which points lie in geometry; `disagree` whether points differ so much that it matters
@@ -50,8 +58,11 @@ impl Scratch {
         inside: &[bool],
         disagree: impl Fn(&[u32]) -> bool,
     ) {
-        self.fallbacks += u64::from(mesh.neighbours(surface, &mut self.points));
-        self.points.find_slots(|id| mesh.slot(id));
+        let fallback = match &mut self.vicinity {
+            Some(vicinity) => mesh.neighbours_within(surface, vicinity, &mut self.points),
+            None => mesh.known_neighbours(surface, &mut self.points),
+        };
+        self.fallbacks += u64::from(fallback);
         match mesh.leaks() {
             Leaks::Allow => {}
             Leaks::Invalidate => {
@@ -125,12 +136,11 @@ impl DirectMesh {
                 ratio * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Directional => {
-                let mut sums = [0.0f32; directional::STRIDE];
+                let mut sums = [Vec4::ZERO; directional::COEFFICIENTS];
                 for (slot, weight) in points.iter() {
-                    for (sum, value) in
-                        sums.iter_mut().zip(self.values.values::<{ directional::STRIDE }>(slot))
-                    {
-                        *sum += weight * value;
+                    let values = self.values.values::<{ directional::STRIDE }>(slot);
+                    for (sum, value) in sums.iter_mut().zip(values.as_chunks::<4>().0) {
+                        *sum += Vec4::from_array(*value) * weight;
                     }
                 }
                 directional::irradiance(&sums, surface.shading_normal) * scale

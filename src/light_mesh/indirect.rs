@@ -333,13 +333,11 @@ impl IndirectMesh {
             .par_chunks_mut(entries)
             .enumerate()
             .map_init(NormalSums::default, |sums, (point, values)| {
-                pulp::Arch::new().dispatch(|| {
-                    sums.clear();
-                    let mut scratch = Scratch::default();
-                    gather(point, sums, &mut scratch);
-                    sums.write_means(directions, values);
-                    scratch.rays
-                })
+                sums.clear();
+                let mut scratch = Scratch::default();
+                gather(point, sums, &mut scratch);
+                sums.write_means(directions, values);
+                scratch.rays
             })
             .sum();
         (values, rays)

@@ -79,6 +79,7 @@ pub fn lights_differ<'a>(mut points: impl Iterator<Item = &'a [VisibilityBits]> 
 }
 
 /// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.
+#[inline(never)]
 pub fn keep_visible<A: Accel>(
     accel: &A,
     mesh: &MeshPoints,

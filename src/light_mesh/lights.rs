@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::attenuation::{Attenuation, InverseSquareFalloff, LinearFalloff, NoFalloff, with_attenuation};
 use crate::scene::{Falloff, LightShape, PointLight, Scene, SurfacePoint};
 
 /// Lights per chunk: one AVX-512 register, two of AVX2.
@@ -166,64 +167,6 @@ fn morton(position: Vec3, bounds: crate::scene::Bounds) -> u32 {
     spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
 }
 
-/// What a light's contribution is multiplied by at distance t: 1/φ1(t), possibly times the cosine over t.
-pub(super) trait Attenuation: Copy {
-    /// 1/(t·φ1(t)) for t > 0.
-    fn over_distance(self, t: f32) -> f32;
-}
-
-/// φ1(t) = c + t.
-#[derive(Clone, Copy)]
-pub(super) struct LinearFalloff(f32);
-/// φ1(t) = t².
-#[derive(Clone, Copy)]
-pub(super) struct InverseSquareFalloff;
-/// φ1(t) = 1.
-#[derive(Clone, Copy)]
-pub(super) struct NoFalloff;
-
-impl Attenuation for LinearFalloff {
-    #[inline(always)]
-    fn over_distance(self, t: f32) -> f32 {
-        1.0 / (t * (self.0 + t).max(Falloff::MIN_DISTANCE))
-    }
-}
-
-impl Attenuation for InverseSquareFalloff {
-    #[inline(always)]
-    fn over_distance(self, t: f32) -> f32 {
-        let clamped = t.max(Falloff::MIN_DISTANCE);
-        1.0 / (t * (clamped * clamped))
-    }
-}
-
-impl Attenuation for NoFalloff {
-    #[inline(always)]
-    fn over_distance(self, t: f32) -> f32 {
-        1.0 / t
-    }
-}
-
-/// Runs `$body` with `$attenuation` bound to the falloff's own type: the choice is made outside the loop over lights.
-macro_rules! with_attenuation {
-    ($falloff:expr, $attenuation:ident => $body:expr) => {
-        match $falloff {
-            Falloff::Linear { constant } => {
-                let $attenuation = LinearFalloff(constant);
-                $body
-            }
-            Falloff::InverseSquare => {
-                let $attenuation = InverseSquareFalloff;
-                $body
-            }
-            Falloff::None => {
-                let $attenuation = NoFalloff;
-                $body
-            }
-        }
-    };
-}
-
 /// Where a light coincides with the point it lights, t is raised to this, so that 0/0 can't arise.
 const TINY_DISTANCE: f32 = 1e-18;
 
@@ -283,23 +226,26 @@ impl LightTable {
         Vec3::from_array(sums.map(|sum| horizontal_sum(&sum)))
     }
 
-    /// Calls `each(chunk, direction by axis, 1/φ1 times the cone's factor)` for every chunk as seen from the point `x`;
-    /// directions are unit length.
+    /// Tells `seen` of every chunk as seen from the point `x`.
     #[inline(always)]
-    pub fn for_each_chunk_from(&self, x: Vec3, mut each: impl FnMut(usize, &[Lanes; 3], &Lanes)) {
-        with_attenuation!(self.falloff, attenuation => {
-            for (index, chunk) in self.chunks.iter().enumerate() {
-                let mut direction = [[0.0f32; LANES]; 3];
-                let mut reciprocal = [0.0f32; LANES];
-                if let Some(shapes) = &chunk.shapes {
-                    for lane in 0..LANES {
-                        let d = chunk.way_from(lane, x.to_array());
-                        let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt().max(TINY_DISTANCE);
-                        (0..3).for_each(|axis| direction[axis][lane] = d[axis] / distance);
-                        let falloff = shapes.over_distance(lane, attenuation, distance) * distance;
-                        reciprocal[lane] = falloff * shapes.cone(lane, d, distance);
-                    }
-                } else {
+    pub fn see_from(&self, x: Vec3, seen: &mut impl SeenFromPoint) {
+        with_attenuation!(self.falloff, attenuation => self.see_from_with(x, attenuation, seen));
+    }
+
+    #[inline(always)]
+    fn see_from_with(&self, x: Vec3, attenuation: impl Attenuation, seen: &mut impl SeenFromPoint) {
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let mut direction = [[0.0f32; LANES]; 3];
+            let mut reciprocal = [0.0f32; LANES];
+            if let Some(shapes) = &chunk.shapes {
+                for lane in 0..LANES {
+                    let d = chunk.way_from(lane, x.to_array());
+                    let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt().max(TINY_DISTANCE);
+                    (0..3).for_each(|axis| direction[axis][lane] = d[axis] / distance);
+                    let falloff = shapes.over_distance(lane, attenuation, distance) * distance;
+                    reciprocal[lane] = falloff * shapes.cone(lane, d, distance);
+                }
+            } else {
                 for lane in 0..LANES {
                     let dx = chunk.position[0][lane] - x.x;
                     let dy = chunk.position[1][lane] - x.y;
@@ -311,11 +257,18 @@ impl LightTable {
                     direction[2][lane] = dz * inverse;
                     reciprocal[lane] = attenuation.over_distance(distance) * distance;
                 }
-                }
-                each(index, &direction, &reciprocal);
             }
-        })
+            seen.chunk(index, &direction, &reciprocal);
+        }
     }
+}
+
+/// What is made of the lights as seen from a point.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+pub trait SeenFromPoint {
+    /// Takes a chunk: directions to its lights by axis, of unit length, and 1/φ1 times the cone's factor.
+    fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes);
 }
 
 /// Visibility bits as 0 and 1 per lane.
@@ -343,6 +296,19 @@ pub fn horizontal_sum(lanes: &Lanes) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Directions and reciprocals of all chunks.
+    fn seen_from_the_origin(table: &LightTable) -> Vec<([Lanes; 3], Lanes)> {
+        struct Seen(Vec<([Lanes; 3], Lanes)>);
+        impl SeenFromPoint for Seen {
+            fn chunk(&mut self, _: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
+                self.0.push((*direction, *reciprocal));
+            }
+        }
+        let mut seen = Seen(Vec::new());
+        table.see_from(Vec3::ZERO, &mut seen);
+        seen.0
+    }
 
     fn surface() -> SurfacePoint {
         SurfacePoint {
@@ -387,9 +353,9 @@ mod tests {
         for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
             let table = LightTable::new(&[light], falloff, 0.0);
             assert!(table.illuminate(&surface(), |_| Some([1.0; LANES])).is_finite());
-            table.for_each_chunk_from(Vec3::ZERO, |_, direction, reciprocal| {
-                assert!(direction.iter().flatten().chain(reciprocal).all(|v| v.is_finite()));
-            });
+            for (direction, reciprocal) in seen_from_the_origin(&table) {
+                assert!(direction.iter().flatten().chain(&reciprocal).all(|v| v.is_finite()));
+            }
         }
     }
 
@@ -418,8 +384,7 @@ mod tests {
             let table = LightTable::new(&[light], Falloff::InverseSquare, 100.0);
             let sum = table.illuminate(&surface(), |_| Some([1.0; LANES]));
             assert!(sum.abs_diff_eq(Vec3::splat(expected), 1e-5), "{light:?}: {sum} for {expected}");
-            let mut reciprocals = 0.0;
-            table.for_each_chunk_from(Vec3::ZERO, |_, _, reciprocal| reciprocals += reciprocal[0]);
+            let reciprocals = seen_from_the_origin(&table)[0].1[0];
             let cosine = if matches!(light.shape, LightShape::Directional { .. }) { 0.5 } else { 1.0 };
             assert!((light.intensity.x * reciprocals * cosine - expected).abs() < 1e-5);
         }

@@ -1,5 +1,6 @@
 //! Light meshes: lazily evaluated values at mesh points in free space, interpolated at surfaces.
 
+mod attenuation;
 mod direct;
 pub mod directional;
 mod emitters;
@@ -16,6 +17,7 @@ mod scattered;
 mod sphere;
 mod store;
 mod tiled;
+mod vicinity;
 
 pub use direct::{Basis, DirectValues};
 pub use estimator::{DirectMesh, Scratch};

@@ -2,6 +2,9 @@
 
 use glam::Vec3;
 
+use super::lights::{LANES, Lanes};
+use super::vicinity::Group;
+
 /// Share of R over which smooth weights rise from 0 at the plane of the hemisphere: without it points would enter and
 /// leave with a step wherever the normal turns.
 const RAMP: f32 = 0.25;
@@ -109,16 +112,46 @@ impl Neighbours {
     /// All are written and the end moves past those that count: in a ball's rows a branch would be a coin toss.
     #[inline(always)]
     pub fn push_row(&mut self, id: impl Fn(usize) -> u64, weights: &[f32]) {
-        if self.count + ROW > self.ids.len() {
-            let capacity = (self.ids.len() * 2).max(64) + ROW;
-            self.ids.resize(capacity, 0);
-            self.weights.resize(capacity, 0.0);
-        }
+        self.make_room(ROW);
         for (i, &weight) in weights.iter().enumerate().take(ROW) {
             self.ids[self.count] = id(i);
             self.weights[self.count] = weight;
             self.count += usize::from(weight > 0.0);
         }
+    }
+
+    /// Adds the points of a group that are in `lanes`, with their slots.
+    #[inline(always)]
+    pub fn push_group(&mut self, group: &Group, weights: &Lanes, mut lanes: u16) {
+        self.make_room(LANES);
+        let room = self.count..self.count + LANES;
+        let ids = &mut self.ids[room.clone()];
+        let places = ids.iter_mut().zip(&mut self.weights[room.clone()]).zip(&mut self.slots[room]);
+        for ((id, weight), slot) in places {
+            if lanes == 0 {
+                break;
+            }
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            (*id, *weight, *slot) = (group.ids[lane], weights[lane], group.slots[lane]);
+            lanes &= lanes - 1;
+            self.count += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn make_room(&mut self, more: usize) {
+        if self.count + more > self.ids.len() {
+            self.grow(more);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self, more: usize) {
+        let capacity = (self.ids.len() * 2).max(64) + more;
+        self.ids.resize(capacity, 0);
+        self.weights.resize(capacity, 0.0);
+        self.slots.resize(capacity, 0);
     }
 
     /// Adds `first` to all ids.
@@ -129,8 +162,9 @@ impl Neighbours {
     /// Looks up the slots.
     #[inline(always)]
     pub fn find_slots(&mut self, slot: impl Fn(u64) -> u32) {
-        self.slots.clear();
-        self.slots.extend(self.ids[..self.count].iter().map(|&id| slot(id)));
+        for (found, &id) in self.slots.iter_mut().zip(&self.ids[..self.count]) {
+            *found = slot(id);
+        }
     }
 
     /// Drops the points that don't `pass`, by index and slot, unless none passes; returns whether any did.
@@ -193,7 +227,7 @@ impl Neighbours {
         &self.ids[..self.count]
     }
 
-    /// The points' slots, after [`Neighbours::find_slots`].
+    /// The points' slots, after [`Neighbours::find_slots`] or from groups.
     #[inline(always)]
     pub fn slots(&self) -> &[u32] {
         &self.slots[..self.count]
@@ -205,7 +239,7 @@ impl Neighbours {
         &self.weights[..self.count]
     }
 
-    /// Slots and weights, after [`Neighbours::find_slots`].
+    /// Slots and weights.
     #[inline(always)]
     pub fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         self.slots().iter().copied().zip(self.weights().iter().copied())

@@ -7,6 +7,9 @@
 //! would be off by a tenth of the light of a single lamp.
 
 use glam::Vec3;
+use pulp::NullaryFnOnce;
+
+use crate::simd::vectorize;
 
 /// Edges that each edge of the octahedron is divided into.
 const DIVISIONS: usize = 4;
@@ -66,16 +69,9 @@ impl NormalSums {
     #[inline(always)]
     pub fn add(&mut self, direction: Vec3, light: Vec3, by_normal: bool) {
         self.total += light;
-        if by_normal {
-            let [nx, ny, nz] = &self.normals;
-            let [r, g, b] = &mut self.sums;
-            for node in 0..PADDED {
-                let cosine = nx[node] * direction.x + ny[node] * direction.y + nz[node] * direction.z;
-                let lobe = if cosine > 0.0 { cosine } else { 0.0 };
-                r[node] += lobe * light.x;
-                g[node] += lobe * light.y;
-                b[node] += lobe * light.z;
-            }
+        // Later bounces bring no light from most directions into most corners.
+        if by_normal && light != Vec3::ZERO {
+            vectorize(AddByNormal { normals: &self.normals, sums: &mut self.sums, direction, light });
         }
     }
 
@@ -87,6 +83,30 @@ impl NormalSums {
         let scale = 4.0 / directions;
         for (node, value) in nodes.iter_mut().enumerate().take(NODES) {
             *value = [0, 1, 2].map(|channel| self.sums[channel][node] * scale);
+        }
+    }
+}
+
+/// Light from one direction for every node, as work for the best instruction set.
+struct AddByNormal<'a> {
+    normals: &'a [[f32; PADDED]; 3],
+    sums: &'a mut [[f32; PADDED]; 3],
+    direction: Vec3,
+    light: Vec3,
+}
+
+impl NullaryFnOnce for AddByNormal<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { normals: [nx, ny, nz], sums: [r, g, b], direction, light } = self;
+        for node in 0..PADDED {
+            let cosine = nx[node] * direction.x + ny[node] * direction.y + nz[node] * direction.z;
+            let lobe = if cosine > 0.0 { cosine } else { 0.0 };
+            r[node] += lobe * light.x;
+            g[node] += lobe * light.y;
+            b[node] += lobe * light.z;
         }
     }
 }

@@ -5,8 +5,9 @@ use glam::Vec3;
 use super::lattice::Lattice;
 use super::neighbours::{Ball, Neighbours};
 use super::scattered::ScatteredPoints;
-use super::store::{PointMask, SlotTable, UNKNOWN};
+use super::store::{NeededPoints, PointMask, SlotTable, UNKNOWN};
 use super::tiled::{TileLayout, TiledPoints};
+use super::vicinity::{Group, Vicinity};
 use crate::scene::{Bounds, SurfacePoint};
 use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Spacing};
 
@@ -70,6 +71,13 @@ pub struct MeshPoints {
     /// Counters since creation.
     pub counters: PointCounters,
 }
+
+/// Side of the cubes whose surface points share a search for mesh points, in units of R: smaller ones are met by fewer
+/// surface points, larger ones have more points around that most of them don't need.
+const CUBE_SIDE: f32 = 0.3;
+
+/// Cubes are told apart up to this far from the origin, in units of their side.
+const FARTHEST_CUBE: f32 = (1 << 20) as f32;
 
 /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
 pub const AUTO_SPACINGS: f32 = 120.0;
@@ -149,10 +157,15 @@ impl MeshPoints {
 
     #[inline(always)]
     fn layer_at(&self, y: Vec3) -> &Layer {
-        let mut found = &self.layers[0];
-        for layer in &self.layers[1..] {
+        &self.layers[self.layer_number_at(y)]
+    }
+
+    #[inline(always)]
+    fn layer_number_at(&self, y: Vec3) -> usize {
+        let mut found = 0;
+        for (number, layer) in self.layers.iter().enumerate().skip(1) {
             if layer.bounds.is_some_and(|bounds| bounds.contains(y)) {
-                found = layer;
+                found = number;
             }
         }
         found
@@ -160,13 +173,11 @@ impl MeshPoints {
 
     /// D_y of a surface point with weights, in a fixed order; returns whether it was empty and the nearest
     /// point took its place. Never empty afterwards.
-    #[inline(always)]
+    #[inline(never)]
     pub fn neighbours(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
         out.clear();
         let layer = self.layer_at(surface.position);
-        let normal = self.hemisphere.then_some(surface.geometric_normal);
-        let smooth = self.neighbourhood == Neighbourhood::SmoothSphere;
-        let ball = Ball::new(surface.position, normal, layer.radius, smooth);
+        let ball = self.ball_in(layer, surface);
         with_set!(&layer.points, set => {
             if self.neighbourhood != Neighbourhood::Nearest {
                 set.gather(&ball, out);
@@ -182,11 +193,110 @@ impl MeshPoints {
         })
     }
 
+    /// [`MeshPoints::neighbours`] with slots, of known points, for one of many surface points that lie close together:
+    /// `vicinity` keeps what is the same for all. It must not outlive the next [`MeshPoints::claim`].
+    #[inline(always)]
+    pub fn neighbours_within(
+        &self,
+        surface: &SurfacePoint,
+        vicinity: &mut Vicinity,
+        out: &mut Neighbours,
+    ) -> bool {
+        out.clear();
+        if let Some((ball, groups)) = self.around(surface, vicinity, |_| {}) {
+            for group in groups {
+                let (weights, lanes) = group.weigh(&ball);
+                out.push_group(group, &weights, lanes);
+            }
+        }
+        out.is_empty() && self.known_neighbours(surface, out)
+    }
+
+    /// [`MeshPoints::neighbours`] with slots, of known points.
+    #[inline(never)]
+    pub fn known_neighbours(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
+        let fallback = self.neighbours(surface, out);
+        out.find_slots(|id| self.slot(id));
+        fallback
+    }
+
+    /// The points in the neighbourhoods of surface points, which should lie close together: bricks and masks, unordered.
+    #[inline(always)]
+    pub fn needed<'a>(&self, surfaces: impl Iterator<Item = &'a SurfacePoint>) -> Vec<(u64, u64)> {
+        let (mut vicinity, mut neighbours) = (Vicinity::default(), Neighbours::default());
+        let mut needed = NeededPoints::default();
+        for surface in surfaces {
+            let mut found = 0;
+            if let Some((ball, groups)) = self
+                .around(surface, &mut vicinity, |group| group.needed_ids().for_each(|id| needed.insert(id)))
+            {
+                for group in groups {
+                    let (_, lanes) = group.weigh(&ball);
+                    group.needed |= lanes;
+                    found |= lanes;
+                }
+            }
+            if found == 0 {
+                self.neighbours(surface, &mut neighbours);
+                neighbours.ids().iter().for_each(|&id| needed.insert(id));
+            }
+        }
+        vicinity.groups().iter().flat_map(Group::needed_ids).for_each(|id| needed.insert(id));
+        needed.into_bricks().collect()
+    }
+
+    /// The ball of a surface point, and all points that may lie in it; `None` where that would be no help.
+    #[inline(always)]
+    fn around<'a>(
+        &self,
+        surface: &SurfacePoint,
+        vicinity: &'a mut Vicinity,
+        forget: impl FnMut(&Group),
+    ) -> Option<(Ball, &'a mut [Group])> {
+        let number = self.layer_number_at(surface.position);
+        let layer = &self.layers[number];
+        let side = CUBE_SIDE * layer.radius;
+        let place = (surface.position * side.recip()).floor();
+        // Where coordinates can hardly tell cubes apart, cubes say nothing about their points.
+        let countable = place.abs().max_element() < FARTHEST_CUBE;
+        if self.neighbourhood == Neighbourhood::Nearest || !countable {
+            return None;
+        }
+        let cube = (number as u32, place.as_ivec3());
+        let groups = vicinity.around(cube, |each| self.surround(layer, place, side, each), forget);
+        Some((self.ball_in(layer, surface), groups))
+    }
+
+    /// Calls `each(id, slot, position)` for the points that may lie in the ball of some point in a cube.
+    fn surround(&self, layer: &Layer, place: Vec3, side: f32, each: &mut dyn FnMut(u64, u32, Vec3)) {
+        let center = (place + 0.5) * side;
+        // What rounding may add to R, generously.
+        let slack = 1e-4 * layer.radius + 16.0 * f32::EPSILON * center.abs().max_element();
+        let reach = layer.radius + slack;
+        let ball = Ball::new(center, None, reach + 0.5 * 3f32.sqrt() * side, false);
+        let mut found = Neighbours::default();
+        with_set!(&layer.points, set => {
+            set.gather(&ball, &mut found);
+            for &id in found.ids() {
+                let position = set.position(id);
+                let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
+                if beside.length_squared() < reach * reach {
+                    each(layer.first_id + id, self.table.slot(layer.first_id + id), position);
+                }
+            }
+        });
+    }
+
     /// Region of space whose points make up D_y of a surface point, unless the neighbourhood is the nearest point.
     pub fn ball(&self, surface: &SurfacePoint) -> Ball {
+        self.ball_in(self.layer_at(surface.position), surface)
+    }
+
+    #[inline(always)]
+    fn ball_in(&self, layer: &Layer, surface: &SurfacePoint) -> Ball {
         let normal = self.hemisphere.then_some(surface.geometric_normal);
         let smooth = self.neighbourhood == Neighbourhood::SmoothSphere;
-        Ball::new(surface.position, normal, self.layer_at(surface.position).radius, smooth)
+        Ball::new(surface.position, normal, layer.radius, smooth)
     }
 
     /// Position of a point.

@@ -1,14 +1,16 @@
 //! The conventional tracer (spec §10): one occlusion ray per light at every surface point.
 
 use glam::Vec3;
+use pulp::NullaryFnOnce;
 
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
-use super::surface_group::{SurfaceGroup, emit_seen};
+use super::surface_group::{SurfaceGroup, light_of_seen};
 use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters};
 use crate::accel::Accel;
 use crate::light_mesh::{LANES, LightTable, VisibilityBits};
+use crate::simd::vectorize;
 
 /// Shades with all shadow rays traced.
 pub(super) struct ConventionalIntegrator<'a, A> {
@@ -21,37 +23,47 @@ pub(super) struct ConventionalIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
     fn prepare(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(
-        &self,
-        _: &Tile,
-        vertices: &[PathVertex],
-        emit: &mut dyn FnMut(&PathVertex, Vec3),
-    ) -> ShadeCounters {
-        pulp::Arch::new().dispatch(|| {
-            let chunks = self.lights.chunks();
-            let mut shadow_rays = 0;
-            let mut bits: Vec<VisibilityBits> = vec![0; chunks.len() * LANES];
-            for members in vertices.chunks(LANES) {
-                bits.fill(0);
-                let mut group = SurfaceGroup::new(members);
-                for (index, chunk) in chunks.iter().enumerate() {
-                    for light in (0..LANES).filter(|light| chunk.used >> light & 1 == 1) {
-                        let facing = group.aim(chunk, light);
-                        if facing == 0 {
-                            continue;
-                        }
-                        shadow_rays += u64::from(facing.count_ones());
-                        let seeing = group.seeing(self.accel, facing);
-                        for point in 0..members.len() {
-                            bits[point * chunks.len() + index] |=
-                                ((seeing >> point & 1) << light) as VisibilityBits;
-                        }
+    fn shade(&self, _: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
+        vectorize(Shade { integrator: self, vertices, light })
+    }
+}
+
+/// Shading of a tile, as work for the best instruction set.
+struct Shade<'a, A> {
+    integrator: &'a ConventionalIntegrator<'a, A>,
+    vertices: &'a [PathVertex],
+    light: &'a mut [Vec3],
+}
+
+impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
+    type Output = ShadeCounters;
+
+    #[inline(always)]
+    fn call(self) -> ShadeCounters {
+        let ConventionalIntegrator { accel, lights, scale } = self.integrator;
+        let chunks = lights.chunks();
+        let mut shadow_rays = 0;
+        let mut bits: Vec<VisibilityBits> = vec![0; chunks.len() * LANES];
+        for (members, light) in self.vertices.chunks(LANES).zip(self.light.chunks_mut(LANES)) {
+            bits.fill(0);
+            let mut group = SurfaceGroup::new(members);
+            for (index, chunk) in chunks.iter().enumerate() {
+                for light in (0..LANES).filter(|light| chunk.used >> light & 1 == 1) {
+                    let facing = group.aim(chunk, light);
+                    if facing == 0 {
+                        continue;
+                    }
+                    shadow_rays += u64::from(facing.count_ones());
+                    let seeing = group.seeing(*accel, facing);
+                    for point in 0..members.len() {
+                        bits[point * chunks.len() + index] |=
+                            ((seeing >> point & 1) << light) as VisibilityBits;
                     }
                 }
-                let mut scaled = |vertex: &PathVertex, light: Vec3| emit(vertex, light * self.scale);
-                emit_seen(&self.lights, members, &bits, &mut scaled);
             }
-            ShadeCounters { shadow_rays, ..ShadeCounters::default() }
-        })
+            light_of_seen(lights, members, &bits, light);
+            light.iter_mut().for_each(|light| *light *= *scale);
+        }
+        ShadeCounters { shadow_rays, ..ShadeCounters::default() }
     }
 }

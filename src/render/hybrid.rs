@@ -9,7 +9,7 @@
 use glam::Vec3;
 
 use super::paths::PathVertex;
-use super::surface_group::{SurfaceGroup, emit_seen};
+use super::surface_group::{SurfaceGroup, light_of_seen};
 use super::tiles::Tile;
 use crate::accel::{Accel, LaneMask};
 use crate::light_mesh::{DirectMesh, LANES, Scratch, VisibilityBits};
@@ -76,15 +76,14 @@ fn choose(points: LaneMask, count: u32, which: usize) -> LaneMask {
     chosen
 }
 
-/// Shades surface points of a tile: calls `emit(vertex, I)` for each; returns the number of rays traced towards lights.
-#[inline(always)]
+/// Shades surface points of a tile: fills `light` with the I of each; returns the number of rays traced towards lights.
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
     mesh: &DirectMesh,
     tile: &Tile,
     vertices: &[PathVertex],
     scratch: &mut Scratch,
-    emit: &mut dyn FnMut(&PathVertex, Vec3),
+    light: &mut [Vec3],
 ) -> u64 {
     let lights = mesh.lights();
     let chunks = lights.chunks().len();
@@ -157,6 +156,6 @@ pub(super) fn shade_hybrid<A: Accel>(
             }
         }
     }
-    emit_seen(lights, vertices, &seen, emit);
+    light_of_seen(lights, vertices, &seen, light);
     rays
 }

@@ -1,6 +1,7 @@
 //! The light-mesh integrator: steps 4 to 11 of the paper's algorithm for a block of surface points.
 
 use glam::Vec3;
+use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 use super::LightMeshes;
@@ -10,9 +11,10 @@ use super::stats::RenderStats;
 use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
 use crate::accel::Accel;
-use crate::light_mesh::{MeshPoints, NeededPoints, Neighbours, PointMask, Scratch};
+use crate::light_mesh::{MeshPoints, PointMask, Scratch};
 use crate::scene::Scene;
 use crate::settings::{Estimator, Resolve, Settings};
+use crate::simd::vectorize;
 
 /// Shades by interpolation of light meshes.
 pub(super) struct LightMeshIntegrator<'a, A> {
@@ -24,21 +26,67 @@ pub(super) struct LightMeshIntegrator<'a, A> {
 
 /// The mesh points in the neighbourhoods of the paths' surface points: bricks and masks, unordered.
 fn needed_by(paths: &[TilePaths], points: &MeshPoints) -> Vec<(u64, u64)> {
-    let parts: Vec<Vec<(u64, u64)>> = paths
-        .par_iter()
-        .map(|tile| {
-            pulp::Arch::new().dispatch(|| {
-                let mut needed = NeededPoints::default();
-                let mut neighbours = Neighbours::default();
-                for vertex in &tile.vertices {
-                    points.neighbours(&vertex.surface, &mut neighbours);
-                    neighbours.ids().iter().for_each(|&id| needed.insert(id));
-                }
-                needed.into_bricks().collect()
-            })
-        })
-        .collect();
+    let parts: Vec<Vec<(u64, u64)>> =
+        paths.par_iter().map(|paths| vectorize(Needed { paths, points })).collect();
     parts.concat()
+}
+
+/// Finding the mesh points of a tile, as work for the best instruction set.
+struct Needed<'a> {
+    paths: &'a TilePaths,
+    points: &'a MeshPoints,
+}
+
+impl NullaryFnOnce for Needed<'_> {
+    type Output = Vec<(u64, u64)>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.points.needed(self.paths.vertices.iter().map(|vertex| &vertex.surface))
+    }
+}
+
+/// Shading of a tile, as work for the best instruction set.
+struct Shade<'a, A> {
+    integrator: &'a LightMeshIntegrator<'a, A>,
+    tile: &'a Tile,
+    vertices: &'a [PathVertex],
+    light: &'a mut [Vec3],
+}
+
+impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
+    type Output = ShadeCounters;
+
+    #[inline(always)]
+    fn call(self) -> ShadeCounters {
+        let Self { integrator: LightMeshIntegrator { accel, settings, meshes, .. }, tile, vertices, light } =
+            self;
+        let mut counters = ShadeCounters::default();
+        let mut scratch = Scratch::for_tile();
+        if settings.light_mesh.resolve == Resolve::Trace
+            && settings.light_mesh.estimator == Estimator::PerLight
+        {
+            counters.shadow_rays = shade_hybrid(*accel, &meshes.direct, tile, vertices, &mut scratch, light);
+        } else {
+            for (vertex, light) in vertices.iter().zip(&mut *light) {
+                *light = meshes.direct.illumination(*accel, &vertex.surface, &mut scratch);
+            }
+        }
+        counters.shadow_rays += scratch.rays;
+        counters.direct_fallbacks = scratch.fallbacks;
+
+        let scale = direct_scale(settings);
+        light.iter_mut().for_each(|light| *light *= scale);
+        if let Some(indirect) = &meshes.indirect {
+            let mut scratch = Scratch::for_tile();
+            for (vertex, light) in vertices.iter().zip(light) {
+                *light += indirect.illumination(*accel, &vertex.surface, &mut scratch);
+            }
+            counters.shadow_rays += scratch.rays;
+            counters.indirect_fallbacks = scratch.fallbacks;
+        }
+        counters
+    }
 }
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
@@ -65,40 +113,7 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         stats.rays.shadow += self.meshes.direct.evaluate(self.accel, self.scene, &needed);
     }
 
-    fn shade(
-        &self,
-        tile: &Tile,
-        vertices: &[PathVertex],
-        emit: &mut dyn FnMut(&PathVertex, Vec3),
-    ) -> ShadeCounters {
-        pulp::Arch::new().dispatch(|| {
-            let scale = direct_scale(self.settings);
-            let LightMeshes { direct, indirect } = &*self.meshes;
-            let mut scratch = Scratch::default();
-            let mut indirect_scratch = Scratch::default();
-            let mut add_indirect = |vertex: &PathVertex, direct_light: Vec3| {
-                let mut illumination = direct_light * scale;
-                if let Some(indirect) = indirect {
-                    illumination += indirect.illumination(self.accel, &vertex.surface, &mut indirect_scratch);
-                }
-                emit(vertex, illumination);
-            };
-            let mut shadow_rays = 0;
-            if self.settings.light_mesh.resolve == Resolve::Trace
-                && self.settings.light_mesh.estimator == Estimator::PerLight
-            {
-                shadow_rays =
-                    shade_hybrid(self.accel, direct, tile, vertices, &mut scratch, &mut add_indirect);
-            } else {
-                for vertex in vertices {
-                    add_indirect(vertex, direct.illumination(self.accel, &vertex.surface, &mut scratch));
-                }
-            }
-            ShadeCounters {
-                shadow_rays: shadow_rays + scratch.rays + indirect_scratch.rays,
-                direct_fallbacks: scratch.fallbacks,
-                indirect_fallbacks: indirect_scratch.fallbacks,
-            }
-        })
+    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, vertices, light })
     }
 }

@@ -46,7 +46,6 @@ const WIDTH: usize = 16;
 const MAX_PASSES: u32 = 1024;
 
 /// Traces the camera paths of a tile.
-#[inline(always)]
 pub fn trace_paths<A: Accel>(
     accel: &A,
     scene: &Scene,

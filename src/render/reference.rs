@@ -1,6 +1,6 @@
 //! The reference (spec §10): eq. (3) without a light mesh. The mean of the exact field over D_y, by dense sampling.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
@@ -148,7 +148,12 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
                 ratio * self.lights.illuminate(surface, |_| Some([1.0; LANES]))
             }
             Estimator::Directional => {
-                directional::irradiance(&mean(field, weights, scale), surface.shading_normal)
+                let mean: [f32; directional::STRIDE] = mean(field, weights, scale);
+                let mut coefficients = [Vec4::ZERO; directional::COEFFICIENTS];
+                for (coefficient, values) in coefficients.iter_mut().zip(mean.as_chunks::<4>().0) {
+                    *coefficient = Vec4::from_array(*values);
+                }
+                directional::irradiance(&coefficients, surface.shading_normal)
             }
         }
     }
@@ -157,27 +162,21 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ReferenceIntegrator<'_, A> {
     fn prepare(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(
-        &self,
-        _: &Tile,
-        vertices: &[PathVertex],
-        emit: &mut dyn FnMut(&PathVertex, Vec3),
-    ) -> ShadeCounters {
+    fn shade(&self, _: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
         let basis = Basis::of(self.settings.light_mesh.estimator);
         let scale = direct_scale(self.settings);
         let mut counters = ShadeCounters::default();
         let mut samples = Samples::default();
-        for vertex in vertices {
-            if self.lights.is_empty() {
-                emit(vertex, Vec3::ZERO);
-                continue;
-            }
+        if self.lights.is_empty() {
+            return counters;
+        }
+        for (vertex, light) in vertices.iter().zip(light) {
             let surface = &vertex.surface;
             counters.direct_fallbacks += u64::from(self.place(surface, &mut samples));
             let mut field = DirectValues::default();
             counters.shadow_rays += field.evaluate(self.accel, &self.lights, basis, &samples.positions);
             counters.shadow_rays += self.exclude_leaks(surface, &mut samples, &field);
-            emit(vertex, self.estimate(surface, &samples.weights, &field) * scale);
+            *light = self.estimate(surface, &samples.weights, &field) * scale;
         }
         counters
     }

@@ -63,20 +63,18 @@ impl SurfaceGroup {
     }
 }
 
-/// Calls `emit(vertex, I)` with the light of the lights whose bits are set, a row of bits per vertex.
+/// I of each vertex from the lights whose bits are set, a row of bits per vertex.
 #[inline(always)]
-pub(super) fn emit_seen(
+pub(super) fn light_of_seen(
     lights: &LightTable,
     vertices: &[PathVertex],
     seen: &[VisibilityBits],
-    emit: &mut dyn FnMut(&PathVertex, Vec3),
+    light: &mut [Vec3],
 ) {
     let chunks = lights.chunks().len();
-    for (number, vertex) in vertices.iter().enumerate() {
+    for (number, (vertex, light)) in vertices.iter().zip(light).enumerate() {
         let bits = &seen[number * chunks..][..chunks];
-        emit(
-            vertex,
-            lights.illuminate(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk]))),
-        );
+        *light =
+            lights.illuminate(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk])));
     }
 }

@@ -33,13 +33,8 @@ pub(super) trait BlockIntegrator: Sync {
     /// Makes ready what the surface points of a block need.
     fn prepare(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
 
-    /// Shades surface points of a tile: calls `emit(vertex, E)` for each, E such that k_d·E is the light sent back.
-    fn shade(
-        &self,
-        tile: &Tile,
-        vertices: &[PathVertex],
-        emit: &mut dyn FnMut(&PathVertex, Vec3),
-    ) -> ShadeCounters;
+    /// Shades surface points of a tile: fills `light` with one E for each, such that k_d·E is the light sent back.
+    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters;
 }
 
 /// What shading one tile counted.
@@ -71,10 +66,7 @@ pub(super) fn wavefront<A: Accel, I: BlockIntegrator>(
     let blocks = blocks(settings.resolution, block_pixels);
     let trace_block = |block: &[Tile], stats: &mut RenderStats| -> Vec<TilePaths> {
         let start = Instant::now();
-        let paths = block
-            .par_iter()
-            .map(|tile| pulp::Arch::new().dispatch(|| trace_paths(accel, scene, &camera, settings, tile)))
-            .collect();
+        let paths = block.par_iter().map(|tile| trace_paths(accel, scene, &camera, settings, tile)).collect();
         add_since(&mut stats.seconds.paths, start);
         paths
     };
@@ -143,10 +135,12 @@ fn shade_tile<I: BlockIntegrator>(
 ) -> (Vec<Vec3>, ShadeCounters) {
     let mut pixels = paths.background.clone();
     debug_assert_eq!(pixels.len(), tile.pixels());
-    let counters = integrator.shade(tile, &paths.vertices, &mut |vertex, illumination| {
+    let mut light = vec![Vec3::ZERO; paths.vertices.len()];
+    let counters = integrator.shade(tile, &paths.vertices, &mut light);
+    for (vertex, light) in paths.vertices.iter().zip(light) {
         let SurfacePoint { emission, diffuse, .. } = vertex.surface;
-        pixels[vertex.pixel as usize] += vertex.weight * (emission + diffuse * illumination);
-    });
+        pixels[vertex.pixel as usize] += vertex.weight * (emission + diffuse * light);
+    }
     let scale = 1.0 / samples as f32;
     pixels.iter_mut().for_each(|pixel| *pixel *= scale);
     (pixels, counters)
