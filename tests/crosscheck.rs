@@ -214,7 +214,7 @@ fn a_miss_is_a_graze_at_the_ends_of_the_interval() {
 }
 
 /// In a triangle's plane a distance is one rounding over another: it is put down to that where it lies nowhere on the
-/// triangle, and a miss is as good as a hit.
+/// triangle, though that is behind the ray, and a miss is as good as a hit.
 #[test]
 fn rays_in_the_plane_of_a_triangle_are_told_apart() {
     let ray = Ray::new(Vec3::new(-1.0, 0.5, 0.0), Vec3::X);
@@ -222,6 +222,8 @@ fn rays_in_the_plane_of_a_triangle_are_told_apart() {
     assert_eq!(judged(&square(None), ray, beyond).0, IN_PLANE);
     let on_it = |_: &Ray, _: Option<Hit>| Some(Hit { t: 1.2, u: 0.5, v: 0.0, instance: 0, triangle: 0 });
     assert!([TIE, GRAZE].contains(&judged(&square(None), ray, on_it).0));
+    let away = Ray::new(Vec3::new(-1.0, 0.5, 0.0), Vec3::NEG_X);
+    assert_eq!(judged(&square(None), away, beyond).0, IN_PLANE, "whose triangles lie behind it");
     let tilted = Ray::new(Vec3::new(-1.0, 0.5, 0.2), Vec3::new(1.5, 0.0, -0.2));
     assert_eq!(judged(&square(None), tilted, beyond).0, UNEXPLAINED, "a ray that crosses the plane");
 }

@@ -1,13 +1,16 @@
 #!/bin/sh
 # Runs the tests against Debian 13's Embree 4, on any amd64 Debian.
 #
-#   tests/debian13.sh [ARGUMENTS OF cargo test]   default: --workspace
-#   tests/debian13.sh --headers                   print the folder of Debian 13's Embree headers
+#   tests/debian13.sh [ARGUMENTS OF cargo test]           default: --workspace
+#   tests/debian13.sh --as-built [ARGUMENTS OF cargo test]
+#   tests/debian13.sh --headers                           print the folder of Debian 13's Embree headers
 #
 # Debian 13's Embree, its threading library and the C and C++ libraries that they need are unpacked
 # (60 MB, not installed) into target/debian13-root, or the folder that DEBIAN13_ROOT names, which is
 # reused by later runs. The tests are then built to start with that C library, so that they, and the
-# programs that they start, load Embree 4 although this system has none, or another one.
+# programs that they start, load Embree 4 although this system has none, or another one. That takes a target
+# folder of its own. With --as-built they are those of an ordinary cargo test, started by Debian 13's loader: no
+# time for building, but programs that a test starts load this system's Embree.
 #
 # Ends with 77, and a line that says why, where that is impossible on this machine.
 set -eu
@@ -69,17 +72,31 @@ libraries=$root/usr/lib/x86_64-linux-gnu
 [ "$("$libraries/ld-linux-x86-64.so.2" --library-path "$libraries" /bin/true && echo runs)" = runs ] ||
     skip "Debian 13's C library does not run here"
 
+REQUIRE_EMBREE=4
+export REQUIRE_EMBREE
+unset EMBREE_LIB
+cd "$here"
+report() {
+    if "$@"; then
+        echo "passed against Debian 13's Embree 4: $*"
+    else
+        echo "FAILED against Debian 13's Embree 4: $*" >&2
+        exit 1
+    fi
+}
+
+if [ "${1:-}" = --as-built ]; then
+    shift
+    CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER="$libraries/ld-linux-x86-64.so.2 --library-path $libraries"
+    export CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER
+    [ $# -gt 0 ] || set -- --workspace
+    report cargo test "$@"
+    exit
+fi
+
 # The explicit target keeps build scripts and procedural macros, which cargo runs, on the system's libraries.
 RUSTFLAGS="-C link-arg=-Wl,--dynamic-linker=$libraries/ld-linux-x86-64.so.2 \
 -C link-arg=-Wl,--disable-new-dtags,-rpath,$libraries ${RUSTFLAGS:-}"
-REQUIRE_EMBREE=4
-export RUSTFLAGS REQUIRE_EMBREE
-unset EMBREE_LIB
+export RUSTFLAGS
 [ $# -gt 0 ] || set -- --workspace
-cd "$here"
-if cargo test --target x86_64-unknown-linux-gnu --target-dir "$here/target/debian13" "$@"; then
-    echo "passed against Debian 13's Embree 4: cargo test $*"
-else
-    echo "FAILED against Debian 13's Embree 4: cargo test $*" >&2
-    exit 1
-fi
+report cargo test --target x86_64-unknown-linux-gnu --target-dir "$here/target/debian13" "$@"

@@ -108,6 +108,24 @@ impl Backend {
         }
     }
 
+    /// Builds every backend that can be had: the BVH, then Embree in every version that is installed. Where there is
+    /// none, it tells why.
+    ///
+    /// # Errors
+    /// As for [`Backend::build`].
+    pub fn build_all(scene: &Scene) -> Result<(Vec<Self>, Option<String>), BackendError> {
+        let mut backends = vec![Self::build(BackendChoice::Bvh, scene)?.backend];
+        let chosen = Self::build(BackendChoice::Auto, scene)?;
+        if chosen.notice.is_none() {
+            backends.push(chosen.backend);
+            #[cfg(feature = "embree")]
+            for accel in EmbreeAccel::build_others(scene)? {
+                backends.push(Self::Embree(accel));
+            }
+        }
+        Ok((backends, chosen.notice))
+    }
+
     /// Name as on the command line.
     pub fn name(&self) -> &'static str {
         match self {

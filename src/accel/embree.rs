@@ -60,6 +60,16 @@ impl EmbreeAccel {
         Self::build_with(&Library::load().map_err(EmbreeError::Library)?, scene)
     }
 
+    /// [`EmbreeAccel::build`] with the versions of Embree that are installed besides the one which that takes.
+    ///
+    /// # Errors
+    ///
+    /// As for [`EmbreeAccel::build`].
+    pub fn build_others(scene: &Scene) -> Result<Vec<Self>, EmbreeError> {
+        let libraries = Library::load_all().map_err(EmbreeError::Library)?;
+        libraries.iter().skip(1).map(|library| Self::build_with(library, scene)).collect()
+    }
+
     /// [`EmbreeAccel::build`] with a library that is loaded already.
     ///
     /// # Errors

@@ -116,12 +116,9 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Verdict, Crossc
 
     check_memory(scene, &[BackendChoice::Bvh, BackendChoice::Auto], args.memory_limit)
         .map_err(|error| CrosscheckError::MemoryLimit { scene: args.scene.clone(), error })?;
-    let mut backends = vec![pool.install(|| Backend::build(BackendChoice::Bvh, scene))?.backend];
-    // Falls back to the BVH, which is there already, where no Embree is installed.
-    let chosen = pool.install(|| Backend::build(BackendChoice::Auto, scene))?;
-    match chosen.notice {
-        None => backends.push(chosen.backend),
-        Some(notice) => reporter.line(&format!("note: {notice}")),
+    let (backends, notice) = pool.install(|| Backend::build_all(scene))?;
+    if let Some(notice) = notice {
+        reporter.line(&format!("note: {notice}"));
     }
     let names: Vec<_> = backends.iter().map(ToString::to_string).collect();
     let subjects: Vec<_> = names

@@ -3,15 +3,19 @@
 
 use glam::{DVec3, Vec3};
 
+use super::judge::LocalRay;
 use crate::scene::Bounds;
 
 /// Boxes per leaf.
 const LEAF: usize = 4;
 
+/// Places between which a split is chosen.
+const BINS: usize = 16;
+
 /// From this many boxes on the two halves are built in parallel.
 const PARALLEL: usize = 1 << 14;
 
-/// Tree over numbered boxes, split at the median of the widest axis.
+/// Tree over numbered boxes, split where the surface area heuristic is least along the widest axis.
 #[derive(Debug, Default)]
 pub struct BoxTree {
     nodes: Vec<Node>,
@@ -31,35 +35,39 @@ struct Node {
 /// A ray for walks through boxes, with the distance by which anything near it counts as met.
 #[derive(Clone, Copy, Debug)]
 pub struct Walker {
-    /// Start.
-    pub origin: DVec3,
-    /// Direction, not 0.
-    pub direction: DVec3,
+    origin: DVec3,
+    /// One over the direction; infinite where that is 0.
+    inverse: DVec3,
     /// Width per distance of a box's farthest corner from the start.
-    pub relative: f64,
+    relative: f64,
     /// Width that is always there.
-    pub absolute: f64,
+    absolute: f64,
 }
 
+/// Nodes that a walk still has to see, with where they begin. Kept between walks, so that they need not allocate.
+pub type Stack = Vec<(u32, f64)>;
+
 impl Walker {
+    /// The ray, with a width of `relative` times the distance that grows along it.
+    pub fn new(ray: &LocalRay, relative: f64) -> Self {
+        let inverse = ray.direction.to_array().map(|d| if d == 0.0 { f64::INFINITY } else { 1.0 / d });
+        Self { origin: ray.origin, inverse: inverse.into(), relative, absolute: ray.origin_error }
+    }
+
     /// Where the ray enters the widened box, within `0..=limit`.
+    #[inline]
     fn enters(&self, bounds: &Bounds, limit: f64) -> Option<f64> {
         let (low, high) = (bounds.min.as_dvec3() - self.origin, bounds.max.as_dvec3() - self.origin);
-        let pad = self.absolute + self.relative * low.abs().max(high.abs()).length();
+        // The sum is no less than the length.
+        let pad = self.absolute + self.relative * low.abs().max(high.abs()).element_sum();
         let (mut near, mut far) = (0.0f64, limit);
         for axis in 0..3 {
-            let (low, high, d) = (low[axis] - pad, high[axis] + pad, self.direction[axis]);
-            if d == 0.0 {
-                if low > 0.0 || high < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let (a, b) = (low / d, high / d);
+            // Beside a slab that the ray runs along both are infinite, of one sign.
+            let (a, b) = ((low[axis] - pad) * self.inverse[axis], (high[axis] + pad) * self.inverse[axis]);
             near = near.max(a.min(b));
             far = far.min(a.max(b));
         }
-        (near <= far).then_some(near)
+        (near <= far && near < f64::INFINITY).then_some(near)
     }
 }
 
@@ -75,13 +83,19 @@ impl BoxTree {
     }
 
     /// Calls `visit` with the number of every box that the ray meets before `limit`, which `visit` may lower.
-    pub fn walk(&self, walker: &Walker, mut limit: f64, mut visit: impl FnMut(u32, f64) -> f64) {
-        let mut stack = Vec::with_capacity(64);
+    pub fn walk(
+        &self,
+        walker: &Walker,
+        stack: &mut Stack,
+        mut limit: f64,
+        mut visit: impl FnMut(u32, f64) -> f64,
+    ) {
+        stack.clear();
         if let Some(near) = self.nodes.first().and_then(|root| walker.enters(&root.bounds, limit)) {
             stack.push((0, near));
         }
         while let Some((index, near)) = stack.pop() {
-            let Some(node) = self.nodes.get(index).filter(|_| near <= limit) else { continue };
+            let Some(node) = self.nodes.get(index as usize).filter(|_| near <= limit) else { continue };
             if node.right == 0 {
                 let range = node.first as usize..(node.first + node.count) as usize;
                 for &number in &self.order[range] {
@@ -89,13 +103,13 @@ impl BoxTree {
                 }
                 continue;
             }
-            let children = [index + 1, index + node.right as usize];
-            let met = children.map(|child| walker.enters(&self.nodes[child].bounds, limit));
-            let mut met: Vec<_> =
-                children.into_iter().zip(met).filter_map(|(child, near)| Some((child, near?))).collect();
+            let children = [index + 1, index + node.right];
+            let met = children.map(|child| walker.enters(&self.nodes[child as usize].bounds, limit));
             // The nearer child is taken up first.
-            met.sort_by(|a, b| b.1.total_cmp(&a.1));
-            stack.extend(met);
+            let order = if met[0] <= met[1] { [1, 0] } else { [0, 1] };
+            for child in order {
+                stack.extend(met[child].map(|near| (children[child], near)));
+            }
         }
     }
 }
@@ -103,8 +117,7 @@ impl BoxTree {
 fn build(boxes: &mut [(Bounds, u32)], first: u32, nodes: &mut Vec<Node>) {
     let (mut bounds, mut centers) = (Bounds::EMPTY, Bounds::EMPTY);
     for (bound, _) in boxes.iter() {
-        bounds.extend(bound.min);
-        bounds.extend(bound.max);
+        bounds = joined(&bounds, bound);
         centers.extend(bound.center());
     }
     let index = nodes.len();
@@ -113,11 +126,7 @@ fn build(boxes: &mut [(Bounds, u32)], first: u32, nodes: &mut Vec<Node>) {
     if count <= LEAF {
         return;
     }
-    let extent = centers.extent();
-    let axis = widest(extent);
-    let (left, _, _) =
-        boxes.select_nth_unstable_by(count / 2, |a, b| a.0.center()[axis].total_cmp(&b.0.center()[axis]));
-    let half = left.len();
+    let half = split(boxes, &centers);
     let (left, right) = boxes.split_at_mut(half);
     let middle = first + half as u32;
     if count < PARALLEL {
@@ -131,6 +140,58 @@ fn build(boxes: &mut [(Bounds, u32)], first: u32, nodes: &mut Vec<Node>) {
         nodes[index].right = (nodes.len() - index) as u32;
         nodes.append(&mut right_nodes);
     }
+}
+
+/// Sorts boxes into two parts, neither of them empty, and returns the size of the first.
+fn split(boxes: &mut [(Bounds, u32)], centers: &Bounds) -> usize {
+    let axis = widest(centers.extent());
+    let (start, scale) = (centers.min[axis], BINS as f32 / centers.extent()[axis]);
+    let bin_of = |bounds: &Bounds| (((bounds.center()[axis] - start) * scale) as usize).min(BINS - 1);
+    let mut bins = [(Bounds::EMPTY, 0u32); BINS];
+    for (bounds, _) in boxes.iter() {
+        let (sum, count) = &mut bins[bin_of(bounds)];
+        *sum = joined(sum, bounds);
+        *count += 1;
+    }
+    let mut behind = [0.0; BINS];
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    for bin in (1..BINS).rev() {
+        (bounds, count) = (joined(&bounds, &bins[bin].0), count + bins[bin].1);
+        behind[bin] = area(&bounds) * f64::from(count);
+    }
+    let (mut best, mut least) = (0, f64::INFINITY);
+    (bounds, count) = (Bounds::EMPTY, 0);
+    for bin in 1..BINS {
+        (bounds, count) = (joined(&bounds, &bins[bin - 1].0), count + bins[bin - 1].1);
+        let cost = area(&bounds) * f64::from(count) + behind[bin];
+        if cost < least && (1..boxes.len()).contains(&(count as usize)) {
+            (best, least) = (bin, cost);
+        }
+    }
+    if best == 0 {
+        // All centers in one place, or not to be told apart.
+        let half = boxes.len() / 2;
+        boxes.select_nth_unstable_by(half, |a, b| a.0.center()[axis].total_cmp(&b.0.center()[axis]));
+        return half;
+    }
+    let mut half = 0;
+    for index in 0..boxes.len() {
+        if bin_of(&boxes[index].0) < best {
+            boxes.swap(index, half);
+            half += 1;
+        }
+    }
+    half
+}
+
+fn joined(a: &Bounds, b: &Bounds) -> Bounds {
+    Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }
+}
+
+/// Half the surface of a box; 0 for the empty one.
+fn area(bounds: &Bounds) -> f64 {
+    let size = bounds.extent().as_dvec3();
+    size.x * size.y + size.y * size.z + size.z * size.x
 }
 
 fn widest(extent: Vec3) -> usize {

@@ -4,13 +4,13 @@
 //! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] asks whether a triangle is
 //! hit, missed, or within that doubt.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::boxes::{BoxTree, Walker};
+use super::boxes::{BoxTree, Stack, Walker};
 use super::placement::Placement;
 use crate::accel::{Hit, MAX_COORDINATE, Ray, largest_coordinate};
-use crate::scene::{Bounds, Scene};
+use crate::scene::{Bounds, Scene, TriangleMesh};
 
 /// How far a corner seems moved, in units of its distance from the ray's origin: 16 roundings of 2⁻²⁴.
 pub const BOUND: f64 = 16.0 / (1 << 24) as f64;
@@ -20,6 +20,10 @@ const UNDERFLOW: f64 = 1e-40;
 
 /// Products beyond this may overflow in single precision.
 const OVERFLOW: f64 = 1e37;
+
+/// How many of its longest edges a triangle may be away for its neighbours' sake, with which it is tested: one that
+/// is seen edge-on is said to be hit from there, since all that is computed of it is rounding.
+const NEIGHBOURS: f64 = 16.0;
 
 /// A triangle that a ray hits, or that it may be said to hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,14 +80,11 @@ impl<'a> Judge<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let placements: Vec<_> =
             scene.instances.iter().map(|i| Placement::new(i.to_world.as_ref())).collect();
-        let boxes_of = |mesh: &crate::scene::TriangleMesh| -> Vec<(Bounds, u32)> {
+        let boxes_of = |mesh: &TriangleMesh| -> Vec<(Bounds, u32)> {
             let triangles = 0..mesh.triangles.len() as u32;
             let boxes = triangles.into_par_iter().filter_map(|triangle| {
                 let corners = mesh.corners(triangle);
-                let usable = corners
-                    .iter()
-                    .all(|corner| (corner.abs().cmple(glam::Vec3::splat(MAX_COORDINATE))).all());
-                usable.then(|| {
+                is_usable(&corners).then(|| {
                     let mut bounds = Bounds::EMPTY;
                     corners.into_iter().for_each(|corner| bounds.extend(corner));
                     (bounds, triangle)
@@ -114,22 +115,27 @@ impl<'a> Judge<'a> {
             return None;
         }
         let local = self.placements.get(instance as usize)?.ray(ray)?;
-        self.test_local(ray, &local, instance, triangle)
+        let mesh = self.scene.meshes.get(self.scene.instances.get(instance as usize)?.mesh as usize)?;
+        if triangle as usize >= mesh.triangles.len() || !is_usable(&mesh.corners(triangle)) {
+            return None;
+        }
+        Self::test_local(ray, &local, mesh, instance, triangle)
     }
 
-    fn test_local(&self, ray: &Ray, local: &LocalRay, instance: u32, triangle: u32) -> Option<Candidate> {
-        let mesh = self.scene.meshes.get(self.scene.instances.get(instance as usize)?.mesh as usize)?;
-        if triangle as usize >= mesh.triangles.len() {
-            return None;
-        }
+    /// [`Judge::test`] for a triangle that exists and is usable.
+    fn test_local(
+        ray: &Ray,
+        local: &LocalRay,
+        mesh: &TriangleMesh,
+        instance: u32,
+        triangle: u32,
+    ) -> Option<Candidate> {
         let corners = mesh.corners(triangle);
-        if !corners.iter().all(|corner| corner.abs().cmple(glam::Vec3::splat(MAX_COORDINATE)).all()) {
-            return None;
-        }
         let crossing = Crossing::new(local, corners.map(|corner| corner.as_dvec3() - local.origin))?;
         let (near, far) = (f64::from(ray.t_near.max(0.0)), f64::from(ray.t_far));
         let Crossing { t, error, .. } = crossing;
-        if t + error < near || t - error > far {
+        // In its plane any distance may come out, though the triangle lies outside the interval.
+        if !crossing.in_plane && (t + error < near || t - error > far) {
             return None;
         }
         let within = t - error > near && t + error < far;
@@ -162,14 +168,16 @@ impl<'a> Judge<'a> {
         if !self.is_ray(ray) {
             return;
         }
+        let Some(world) = Placement::World.ray(ray) else { return };
         let mut limit = f64::from(ray.t_far);
-        let world = Placement::World.walker(ray);
-        self.top.walk(&world, widened(limit), |instance, _| {
+        let (mut stack, mut inner) = (Stack::with_capacity(64), Stack::with_capacity(64));
+        self.top.walk(&world.walker(), &mut stack, widened(limit), |instance, _| {
             let placement = &self.placements[instance as usize];
             let Some(local) = placement.ray(ray) else { return widened(limit) };
-            let tree = &self.trees[self.scene.instances[instance as usize].mesh as usize];
-            tree.walk(&local.walker(), widened(limit), |triangle, _| {
-                if let Some(candidate) = self.test_local(ray, &local, instance, triangle) {
+            let mesh = self.scene.instances[instance as usize].mesh as usize;
+            let (tree, mesh) = (&self.trees[mesh], &self.scene.meshes[mesh]);
+            tree.walk(&local.walker(), &mut inner, widened(limit), |triangle, _| {
+                if let Some(candidate) = Self::test_local(ray, &local, mesh, instance, triangle) {
                     limit = limit.min(found(&candidate));
                 }
                 widened(limit)
@@ -199,6 +207,11 @@ fn widened(limit: f64) -> f64 {
     limit * (1.0 + 1e-5)
 }
 
+/// Whether a triangle is in the scene at all.
+fn is_usable(corners: &[Vec3; 3]) -> bool {
+    corners.iter().all(|corner| corner.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
+}
+
 /// A ray in an instance's space.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalRay {
@@ -209,20 +222,28 @@ pub struct LocalRay {
     /// By how much an origin in single precision may be off.
     pub origin_error: f64,
     /// The same for the direction.
-    pub direction_error: f64,
+    direction_error: f64,
+    /// Length of the direction.
+    length: f64,
+    /// The direction at length 1.
+    along: DVec3,
+    /// Two directions across it.
+    across: (DVec3, DVec3),
 }
 
 impl LocalRay {
+    /// A ray whose origin and direction may be off by the two errors.
+    pub fn new(origin: DVec3, direction: DVec3, [origin_error, direction_error]: [f64; 2]) -> Self {
+        let length = direction.length();
+        let along = direction / length;
+        let across = along.any_orthonormal_pair();
+        Self { origin, direction, origin_error, direction_error, length, along, across }
+    }
+
     /// For walks through boxes.
     pub fn walker(&self) -> Walker {
         // At a distance r the ray has turned aside by r · Δd / |d|.
-        let turn = self.direction_error / self.direction.length();
-        Walker {
-            origin: self.origin,
-            direction: self.direction,
-            relative: BOUND + turn,
-            absolute: self.origin_error,
-        }
+        Walker::new(self, BOUND + self.direction_error / self.length)
     }
 }
 
@@ -242,24 +263,24 @@ struct Crossing {
 impl Crossing {
     /// `corners` are relative to the ray's origin.
     fn new(ray: &LocalRay, corners: [DVec3; 3]) -> Option<Self> {
-        let length = ray.direction.length();
-        let along = ray.direction / length;
-        let reach = corners.iter().map(|corner| corner.length()).fold(0.0, f64::max);
+        let (length, along, across) = (ray.length, ray.along, ray.across);
+        let reach = corners.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max).sqrt();
         // δ: how far a corner seems moved.
         let moved = BOUND * reach + ray.origin_error + ray.direction_error / length * reach;
-        let across = along.any_orthonormal_pair();
         let flat = corners.map(|corner| [corner.dot(across.0), corner.dot(across.1)]);
         let [a, b, c] = corners;
         let sides = [(1, 2), (2, 0), (0, 1)];
-        let lengths = sides.map(|(p, q)| (corners[q] - corners[p]).length());
-        let longest = lengths.into_iter().fold(0.0, f64::max);
-        let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
-        let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
-        let distances = flat.map(|[x, y]| x.hypot(y));
+        let lengths = sides.map(|(p, q)| (corners[q] - corners[p]).length_squared());
+        let longest = lengths.into_iter().fold(0.0, f64::max).sqrt();
+        let distances = flat.map(|[x, y]| x * x + y * y);
         // Boxes keep ray tracers from triangles that are nowhere near.
-        if distances.into_iter().fold(f64::INFINITY, f64::min) > longest + 4.0 * moved {
+        let far = NEIGHBOURS * longest + 4.0 * moved;
+        if distances.into_iter().fold(f64::INFINITY, f64::min) > far * far {
             return None;
         }
+        let (lengths, distances) = (lengths.map(f64::sqrt), distances.map(f64::sqrt));
+        let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
+        let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
         let doubts: [f64; 3] = std::array::from_fn(|i| {
             let (p, q) = sides[i];
             // A moved corner turns its edge about the other one.

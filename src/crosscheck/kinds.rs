@@ -53,6 +53,32 @@ const RESOLUTION: (u32, u32) = (1024, 768);
 /// Camera rays per pixel to choose from.
 const SAMPLES: u32 = 16;
 
+/// Rays that are made in one place, or each somewhere else: as many as are asked about in one go.
+const RUN: usize = super::GROUP;
+
+/// Of so many runs one has its rays apart.
+const APART: u64 = 4;
+
+/// Rays of a run in one place take one of so many triangles that follow each other, and pixels within a square of so
+/// many.
+const BESIDE: u32 = 16;
+
+/// What a ray at a triangle is made of.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Which instance.
+    instance: usize,
+    /// Which triangle of it.
+    triangle: u32,
+    /// Somewhere in the air.
+    air: Vec3,
+    /// Some direction of length 1.
+    way: Vec3,
+}
+
+/// A camera and a pixel.
+type Pixel = (usize, u32, u32);
+
 /// Makes rays for a scene.
 pub struct RaySource<'a> {
     scene: &'a Scene,
@@ -109,8 +135,12 @@ impl<'a> RaySource<'a> {
             Kind::Camera => self.camera(random, rays),
             Kind::Occlusion => self.occlusion(random, rays),
             Kind::Mirror => {
-                let (seen, surface) = self.surface(random);
-                rays.push(Ray::new(surface.ray_origin(), seen.reflect(surface.shading_normal)));
+                let (first, together) = (self.pixel(random), together(random));
+                for _ in 0..RUN.min(count) {
+                    let pixel = if together { beside(first, random) } else { self.pixel(random) };
+                    let (seen, surface) = self.surface(pixel, random);
+                    rays.push(Ray::new(surface.ray_origin(), seen.reflect(surface.shading_normal)));
+                }
             }
             Kind::Sphere => {
                 let origin = self.anywhere(random);
@@ -121,13 +151,16 @@ impl<'a> RaySource<'a> {
                     let kinds = &Kind::ALL[1..Kind::ALL.len() - 1];
                     let kind = kinds[random.next() as usize % kinds.len()];
                     let start = rays.len();
-                    self.some(kind, count, random, rays);
+                    self.some(kind, 1, random, rays);
                     rays.truncate(start + 1);
                 }
             }
             _ => {
-                let corners = self.triangle(random);
-                rays.push(self.at_triangle(kind, corners, random));
+                let (first, together) = (self.place(random), together(random));
+                for _ in 0..RUN.min(count) {
+                    let place = if together { self.beside(&first, random) } else { self.place(random) };
+                    rays.push(self.at_triangle(kind, &place, random));
+                }
             }
         }
     }
@@ -150,7 +183,7 @@ impl<'a> RaySource<'a> {
     /// From one point to all lights, or from neighbouring points to one light after the other.
     fn occlusion(&self, random: &mut SplitMix64, rays: &mut Vec<Ray>) {
         let points: Vec<Vec3> = if random.next() & 1 == 0 {
-            vec![self.surface(random).1.ray_origin()]
+            vec![self.surface(self.pixel(random), random).1.ray_origin()]
         } else {
             let corner = self.anywhere(random);
             let spacing = 0.01 * self.bounds.extent().max_element();
@@ -169,20 +202,23 @@ impl<'a> RaySource<'a> {
         }
     }
 
-    /// A point that a camera sees, or one on any triangle, with the direction that it is seen along.
-    fn surface(&self, random: &mut SplitMix64) -> (Vec3, SurfacePoint) {
+    fn pixel(&self, random: &mut SplitMix64) -> Pixel {
+        let camera = random.next() as usize % self.cameras.len().max(1);
+        (camera, random.next() as u32 % RESOLUTION.0, random.next() as u32 % RESOLUTION.1)
+    }
+
+    /// A point that is seen in a pixel, or in any other where that is empty, with the direction that it is seen along.
+    fn surface(&self, mut pixel: Pixel, random: &mut SplitMix64) -> (Vec3, SurfacePoint) {
         for _ in 0..4 {
-            let ray = match self.cameras.get(random.next() as usize % self.cameras.len().max(1)) {
-                Some(camera) => camera.ray(
-                    random.next() as u32 % RESOLUTION.0,
-                    random.next() as u32 % RESOLUTION.1,
-                    random.next() as u32 % SAMPLES,
-                ),
+            let (camera, x, y) = pixel;
+            let ray = match self.cameras.get(camera) {
+                Some(camera) => camera.ray(x, y, random.next() as u32 % SAMPLES),
                 None => Ray::new(self.anywhere(random), direction(random)),
             };
             if let Some(hit) = self.tracer.nearest(&ray) {
                 return (ray.direction, self.scene.surface_point(&hit, ray.direction));
             }
+            pixel = self.pixel(random);
         }
         // Nothing is seen: a point in the air does as well.
         let normal = direction(random);
@@ -201,11 +237,12 @@ impl<'a> RaySource<'a> {
         (-normal, point)
     }
 
-    fn at_triangle(&self, kind: Kind, corners: [Vec3; 3], random: &mut SplitMix64) -> Ray {
+    fn at_triangle(&self, kind: Kind, place: &Place, random: &mut SplitMix64) -> Ray {
+        let corners = self.corners(place, random);
         let first = random.next() as usize % 3;
         let [a, b, c] = [0, 1, 2].map(|i| corners[(first + i) % 3]);
         let (on_edge, inside) = (a.lerp(b, random.unit()), inside(corners, random));
-        let origin = self.origin(a, random);
+        let origin = self.origin(a, place.air, random);
         let aimed = |from: Vec3, at: Vec3, random: &mut SplitMix64| match random.next() % 3 {
             0 => Ray::between(from, at),
             1 => Ray::new(from, at - from),
@@ -248,25 +285,25 @@ impl<'a> RaySource<'a> {
             }
             Kind::Far => {
                 let size = self.bounds.extent().max_element().max(f32::MIN_POSITIVE);
-                let far = inside + size * 10f32.powf(random.between(0.0, 3.0)) * direction(random);
+                let far = inside + size * 10f32.powf(random.between(0.0, 3.0)) * place.way;
                 aimed(far, [inside, inside, on_edge, a][random.next() as usize % 4], random)
             }
             _ => {
                 let start = [a, on_edge, inside, inside][random.next() as usize % 4];
                 match random.next() % 3 {
-                    0 => Ray::new(start, direction(random)),
-                    1 => Ray::between(start, self.anywhere(random)),
-                    _ => Ray::between(self.anywhere(random), start),
+                    0 => Ray::new(start, place.way),
+                    1 => Ray::between(start, place.air),
+                    _ => Ray::between(place.air, start),
                 }
             }
         }
     }
 
-    /// Somewhere to start from: in the scene's box, or near the triangle.
-    fn origin(&self, near: Vec3, random: &mut SplitMix64) -> Vec3 {
+    /// Somewhere to start from: in the air, or near the triangle.
+    fn origin(&self, near: Vec3, air: Vec3, random: &mut SplitMix64) -> Vec3 {
         match random.next() % 3 {
             0 => near + random.unit() * 0.01 * self.bounds.extent().max_element() * direction(random),
-            _ => self.anywhere(random),
+            _ => air,
         }
     }
 
@@ -274,28 +311,53 @@ impl<'a> RaySource<'a> {
         random.in_box(self.bounds.min, self.bounds.max)
     }
 
-    /// The corners of a triangle in world space: of any instance, or of any triangle, in turn.
-    fn triangle(&self, random: &mut SplitMix64) -> [Vec3; 3] {
-        let total = self.triangles.last().copied().unwrap_or(0);
-        if total == 0 {
-            return [self.anywhere(random), self.anywhere(random), self.anywhere(random)];
-        }
+    /// A place at any instance, or at any triangle, in turn.
+    fn place(&self, random: &mut SplitMix64) -> Place {
+        let (air, way) = (self.anywhere(random), direction(random));
+        let total = self.triangles.last().copied().unwrap_or(0).max(1);
         let drawn = random.next() % total;
-        let mut number = self.triangles.partition_point(|&up_to| up_to <= drawn);
+        let mut instance = self.triangles.partition_point(|&up_to| up_to <= drawn);
         if random.next() & 1 == 0 {
-            number = random.next() as usize % self.triangles.len();
+            instance = random.next() as usize % self.triangles.len().max(1);
         }
-        let instance = &self.scene.instances[number];
-        let mesh = &self.scene.meshes[instance.mesh as usize];
-        if mesh.triangles.is_empty() {
-            return self.triangle(random);
-        }
-        let corners = mesh.corners((random.next() % mesh.triangles.len() as u64) as u32);
+        Place { instance, triangle: random.next() as u32, air, way }
+    }
+
+    /// One close to another.
+    fn beside(&self, place: &Place, random: &mut SplitMix64) -> Place {
+        let triangle = place.triangle.wrapping_add(random.next() as u32 % BESIDE);
+        let air = place.air + random.unit() * 0.02 * self.bounds.extent().max_element() * direction(random);
+        let way = (place.way + 0.05 * direction(random)).normalize_or(place.way);
+        Place { triangle, air, way, ..*place }
+    }
+
+    /// The corners of a place's triangle in world space.
+    fn corners(&self, place: &Place, random: &mut SplitMix64) -> [Vec3; 3] {
+        let instance = self.scene.instances.get(place.instance);
+        let mesh = instance.and_then(|instance| self.scene.meshes.get(instance.mesh as usize));
+        let (Some(instance), Some(mesh)) = (instance, mesh.filter(|mesh| !mesh.triangles.is_empty())) else {
+            return [self.anywhere(random), self.anywhere(random), self.anywhere(random)];
+        };
+        let corners = mesh.corners(place.triangle % mesh.triangles.len() as u32);
         match &instance.to_world {
             Some(to_world) => corners.map(|corner| to_world.transform_point3(corner)),
             None => corners,
         }
     }
+}
+
+/// Whether a run of rays is made in one place, as those of rendering mostly are.
+fn together(random: &mut SplitMix64) -> bool {
+    !random.next().is_multiple_of(APART)
+}
+
+/// A pixel close to another.
+fn beside((camera, x, y): Pixel, random: &mut SplitMix64) -> Pixel {
+    (
+        camera,
+        x / BESIDE * BESIDE + random.next() as u32 % BESIDE,
+        y / BESIDE * BESIDE + random.next() as u32 % BESIDE,
+    )
 }
 
 /// Uniform on the unit sphere.

@@ -13,13 +13,11 @@ mod replay;
 mod report;
 mod watertight;
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 
 pub use judge::{BOUND, Candidate, Judge, Truth};
 pub use kinds::{Kind, RaySource};
-pub use queries::{Answer, Ask, Query, packets};
+pub use queries::{Answer, Answers, Ask, Query, packets};
 pub use ray_text::{RayTextError, from_text, to_text};
 pub use replay::{Replay, replay};
 pub use report::{Class, Counts, KindCounts, Report, Unexplained};
@@ -30,6 +28,10 @@ use crate::scene::{Camera, Scene};
 
 /// Rays that are made and asked about together, all of one kind.
 const BLOCK: u64 = 4096;
+
+/// Rays that are asked about in one go, in all forms of query: what the first reads of a tree is still in the
+/// processor's cache for the others.
+const GROUP: usize = 64;
 
 /// Of the rays that all agree about, one in so many is judged nevertheless.
 const AUDIT: usize = 16;
@@ -107,40 +109,53 @@ pub struct Checked {
 
 /// An answer that differs from the reference's.
 struct Disagreement {
+    /// Which ray of the group.
+    ray: usize,
     subject: usize,
     query: Query,
+    /// `None` where a lane answered that was switched off.
     answer: Option<Answer>,
 }
 
 /// Asks all subjects about some rays and judges what they disagree about.
 pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked {
-    let mut checked = Checked {
-        rays: rays.len() as u64,
-        counts: vec![Counts::default(); subjects.len()],
-        ..Checked::default()
-    };
-    let Some(first) = subjects.first() else { return checked };
-    let reference: Vec<_> = rays.iter().map(|ray| first.accel.nearest(ray)).collect();
-    let mut disagreements: BTreeMap<usize, Vec<Disagreement>> = BTreeMap::new();
-    for (number, subject) in subjects.iter().enumerate() {
+    let counts = vec![Counts::default(); subjects.len()];
+    let mut checked = Checked { rays: rays.len() as u64, counts, ..Checked::default() };
+    for (number, rays) in rays.chunks(GROUP).enumerate() {
+        check_group(judge, subjects, number, rays, &mut checked);
+    }
+    checked
+}
+
+fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], checked: &mut Checked) {
+    let mut reference: Vec<Option<Hit>> = Vec::new();
+    let mut disagreements = Vec::new();
+    for (subject, Subject { accel, .. }) in subjects.iter().enumerate() {
         for query in Query::all() {
-            let answers = subject.accel.ask(query, rays);
-            for (ray, (answer, reference)) in answers.answers.iter().zip(&reference).enumerate() {
+            let Answers { answers, strays } = accel.ask(query, group, rays);
+            if reference.is_empty() {
+                // The first subject's nearest hits of single rays.
+                reference = answers.iter().map(Answer::nearest).collect();
+            }
+            for (ray, (answer, reference)) in answers.iter().zip(&reference).enumerate() {
                 if !equal(answer, reference.as_ref()) {
-                    let found = Disagreement { subject: number, query, answer: Some(*answer) };
-                    disagreements.entry(ray).or_default().push(found);
+                    disagreements.push(Disagreement { ray, subject, query, answer: Some(*answer) });
                 }
             }
-            for ray in answers.strays {
-                let found = Disagreement { subject: number, query, answer: None };
-                disagreements.entry(ray).or_default().push(found);
-            }
+            let strays = strays.into_iter();
+            disagreements.extend(strays.map(|ray| Disagreement { ray, subject, query, answer: None }));
         }
     }
+    // Stable, so that the subjects stay in order.
+    disagreements.sort_by_key(|found| found.ray);
 
+    let mut left = disagreements.as_slice();
     let mut classes = vec![Class::Agree; subjects.len()];
+    // What has been said of the same ray already; most queries answer the same.
+    let mut judged: Vec<(Answer, Option<Class>)> = Vec::new();
     for (index, (ray, reference)) in rays.iter().zip(&reference).enumerate() {
-        let found = disagreements.get(&index).map_or(&[][..], Vec::as_slice);
+        let (found, others) = left.split_at(left.partition_point(|found| found.ray == index));
+        left = others;
         if found.is_empty() && index % AUDIT != 0 {
             checked.counts.iter_mut().for_each(|counts| counts.add(Class::Agree));
             continue;
@@ -148,9 +163,10 @@ pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked 
         checked.audited += u64::from(found.is_empty());
         let truth = judge.truth(ray);
         classes.fill(Class::Agree);
+        judged.clear();
         let mut complain = |subject: usize, query: Query, answer: Option<Answer>| {
             if checked.unexplained.len() < KEPT {
-                let (start, packet, _) = packets(query.width, rays)
+                let (start, packet, _) = packets(query.width, group, rays)
                     .find(|(start, packet, _)| (*start..*start + packet.len()).contains(&index))
                     .unwrap_or((0, rays, crate::accel::Coherence::Coherent));
                 checked.unexplained.push(Unexplained {
@@ -170,24 +186,27 @@ pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked 
             let query = Query { occlusion: false, width: 1 };
             complain(0, query, Some(Answer::Nearest(*reference)));
         }
-        for Disagreement { subject, query, answer } in found {
-            let class = match answer {
-                Some(answer) if admits(judge, ray, &truth, answer) => {
-                    explained(judge, ray, answer, reference.as_ref(), &mut checked.worst)
+        for Disagreement { subject, query, answer, .. } in found {
+            let class = answer.and_then(|answer| {
+                if let Some((_, class)) = judged.iter().find(|(known, _)| *known == answer) {
+                    return *class;
                 }
-                _ => {
-                    // The first query that fails tells enough.
-                    if classes[*subject] != Class::Unexplained {
-                        complain(*subject, *query, *answer);
-                    }
-                    Class::Unexplained
-                }
-            };
-            classes[*subject] = classes[*subject].max(class);
+                let class = admits(judge, ray, &truth, &answer)
+                    .then(|| explained(judge, ray, &answer, reference.as_ref(), &mut checked.worst));
+                judged.push((answer, class));
+                class
+            });
+            // What stands in the way is named by the nearest hits, which came first.
+            let edge_on = *answer == Some(Answer::Occluded(true)) && classes[*subject] == Class::InPlane;
+            let class = class.or(edge_on.then_some(Class::InPlane));
+            // The first query that fails tells enough.
+            if class.is_none() && classes[*subject] != Class::Unexplained {
+                complain(*subject, *query, *answer);
+            }
+            classes[*subject] = classes[*subject].max(class.unwrap_or(Class::Unexplained));
         }
         checked.counts.iter_mut().zip(&classes).for_each(|(counts, class)| counts.add(*class));
     }
-    checked
 }
 
 /// Whether an answer is the reference's, as far as single precision can tell.

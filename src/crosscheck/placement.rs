@@ -2,7 +2,6 @@
 
 use glam::{Affine3A, DMat3, DVec3};
 
-use super::boxes::Walker;
 use super::judge::{BOUND, LocalRay};
 use crate::accel::{Ray, largest_coordinate_of};
 use crate::scene::Bounds;
@@ -68,27 +67,18 @@ impl Placement {
     pub fn ray(&self, ray: &Ray) -> Option<LocalRay> {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         match self {
-            Self::World => Some(LocalRay { origin, direction, origin_error: 0.0, direction_error: 0.0 }),
+            Self::World => Some(LocalRay::new(origin, direction, [0.0; 2])),
             Self::Nowhere => None,
             Self::Placed(inverse) => {
                 let error = |vector: DVec3| {
                     let rounding = sizes(&inverse.matrix) * vector.abs() * BOUND;
                     (rounding + inverse.matrix_error * vector.abs()).length()
                 };
-                Some(LocalRay {
-                    origin: inverse.matrix * origin + inverse.translation,
-                    direction: inverse.matrix * direction,
-                    origin_error: error(origin) + inverse.translation_error,
-                    direction_error: error(direction),
-                })
+                let errors = [error(origin) + inverse.translation_error, error(direction)];
+                let moved = inverse.matrix * origin + inverse.translation;
+                Some(LocalRay::new(moved, inverse.matrix * direction, errors))
             }
         }
-    }
-
-    /// The ray in world space for walks through the boxes of instances.
-    pub fn walker(&self, ray: &Ray) -> Walker {
-        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        Walker { origin, direction, relative: BOUND, absolute: 0.0 }
     }
 
     /// Box in world space of a box in object space, with room for the doubt that a ray has in object space.

@@ -1,5 +1,6 @@
 //! The queries of a backend, and how they are asked.
 
+use super::GROUP;
 use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
 
 /// Rays per packet; 1 for single rays.
@@ -41,6 +42,14 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// The hit, if it tells one.
+    pub(super) fn nearest(&self) -> Option<Hit> {
+        match self {
+            Self::Nearest(hit) => *hit,
+            Self::Occluded(_) => None,
+        }
+    }
+
     /// Whether it speaks of a hit.
     pub fn is_hit(&self) -> bool {
         match self {
@@ -61,21 +70,21 @@ pub struct Answers {
 
 /// An [`Accel`] whose type is forgotten.
 pub trait Ask: Send + Sync {
-    /// Asks about all rays.
-    fn ask(&self, query: Query, rays: &[Ray]) -> Answers;
+    /// Asks about all rays, in [`packets`].
+    fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers;
     /// The nearest hit of one ray.
     fn nearest(&self, ray: &Ray) -> Option<Hit>;
 }
 
 impl<A: Accel> Ask for A {
-    fn ask(&self, query: Query, rays: &[Ray]) -> Answers {
+    fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers {
         match (query.occlusion, query.width) {
-            (false, 4) => nearest::<A, 4>(self, rays),
-            (false, 8) => nearest::<A, 8>(self, rays),
-            (false, 16) => nearest::<A, 16>(self, rays),
-            (true, 4) => occlusion::<A, 4>(self, rays),
-            (true, 8) => occlusion::<A, 8>(self, rays),
-            (true, 16) => occlusion::<A, 16>(self, rays),
+            (false, 4) => nearest::<A, 4>(self, group, rays),
+            (false, 8) => nearest::<A, 8>(self, group, rays),
+            (false, 16) => nearest::<A, 16>(self, group, rays),
+            (true, 4) => occlusion::<A, 4>(self, group, rays),
+            (true, 8) => occlusion::<A, 8>(self, group, rays),
+            (true, 16) => occlusion::<A, 16>(self, group, rays),
             (false, _) => {
                 let answers = rays.iter().map(|ray| Answer::Nearest(self.intersect(ray)));
                 Answers { answers: answers.collect(), strays: Vec::new() }
@@ -93,9 +102,11 @@ impl<A: Accel> Ask for A {
 }
 
 /// Cuts rays into packets of `width`, every eighth of them partly filled as the last ones of a list are, with
-/// either hint of coherence in turn.
-pub fn packets(width: usize, rays: &[Ray]) -> impl Iterator<Item = (usize, &[Ray], Coherence)> {
-    let (mut first, mut number) = (0, 0);
+/// either hint of coherence in turn. The number of the group makes groups start at different places of that
+/// sequence.
+pub fn packets(width: usize, group: usize, rays: &[Ray]) -> impl Iterator<Item = (usize, &[Ray], Coherence)> {
+    // One more than a group has full ones is odd, so that all places have their turn.
+    let (mut first, mut number) = (0, group * (GROUP / width + 1));
     std::iter::from_fn(move || {
         let wanted = if number % 8 == 7 { 1 + (number / 8) % width } else { width };
         let coherence = if number % 2 == 0 { Coherence::Coherent } else { Coherence::Incoherent };
@@ -113,9 +124,9 @@ fn active(rays: &[Ray]) -> LaneMask {
     (1 << rays.len()) - 1
 }
 
-fn nearest<A: Accel, const N: usize>(accel: &A, rays: &[Ray]) -> Answers {
+fn nearest<A: Accel, const N: usize>(accel: &A, group: usize, rays: &[Ray]) -> Answers {
     let mut answers = Answers { answers: Vec::with_capacity(rays.len()), strays: Vec::new() };
-    for (first, rays, coherence) in packets(N, rays) {
+    for (first, rays, coherence) in packets(N, group, rays) {
         let mut packet = RayHitPacket::<N>::empty();
         (0..N).for_each(|lane| packet.set_lane(lane, rays.get(lane).unwrap_or(&rays[0])));
         accel.intersect_packet(active(rays), &mut packet, coherence);
@@ -127,9 +138,9 @@ fn nearest<A: Accel, const N: usize>(accel: &A, rays: &[Ray]) -> Answers {
     answers
 }
 
-fn occlusion<A: Accel, const N: usize>(accel: &A, rays: &[Ray]) -> Answers {
+fn occlusion<A: Accel, const N: usize>(accel: &A, group: usize, rays: &[Ray]) -> Answers {
     let mut answers = Answers { answers: Vec::with_capacity(rays.len()), strays: Vec::new() };
-    for (first, rays, coherence) in packets(N, rays) {
+    for (first, rays, coherence) in packets(N, group, rays) {
         let mut packet = RayPacket::<N>::empty();
         (0..N).for_each(|lane| packet.set_lane(lane, rays.get(lane).unwrap_or(&rays[0])));
         let blocked = accel.occluded_packet(active(rays), &mut packet, coherence);

@@ -6,7 +6,7 @@ use super::judge::{Candidate, Judge};
 use super::queries::Query;
 use super::ray_text::to_text;
 use super::report::describe;
-use super::{Checked, Subject, check_rays};
+use super::{Checked, GROUP, Subject, check_rays};
 use crate::accel::Ray;
 use crate::scene::Scene;
 
@@ -46,9 +46,12 @@ pub fn replay(scene: &Scene, subjects: &[Subject], rays: &[Ray]) -> Replay {
         .collect();
     for subject in subjects {
         for query in Query::all() {
-            let answers = subject.accel.ask(query, rays);
-            for (replayed, answer) in replayed.iter_mut().zip(&answers.answers) {
-                replayed.answers.push((subject.name.to_owned(), query, describe(answer)));
+            let groups = rays.chunks(GROUP).zip(replayed.chunks_mut(GROUP)).enumerate();
+            for (number, (rays, replayed)) in groups {
+                let answers = subject.accel.ask(query, number, rays).answers;
+                for (replayed, answer) in replayed.iter_mut().zip(&answers) {
+                    replayed.answers.push((subject.name.to_owned(), query, describe(answer)));
+                }
             }
         }
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::queries::{Ask, Query};
-use super::{BLOCK, Subject};
+use super::{BLOCK, GROUP, Subject};
 use crate::accel::Ray;
 use crate::scene::Scene;
 use crate::scene::random::SplitMix64;
@@ -136,13 +136,16 @@ fn distance_to_walls(accel: &dyn Ask, inside: Vec3) -> f32 {
 }
 
 fn count_escapes(accel: &dyn Ask, rays: &[Ray]) -> u64 {
-    let mut escaped = vec![false; rays.len()];
-    for query in Query::all() {
-        for (escaped, answer) in escaped.iter_mut().zip(accel.ask(query, rays).answers) {
-            *escaped |= !answer.is_hit();
+    let of_group = |(number, rays): (usize, &[Ray])| {
+        let mut escaped = [false; GROUP];
+        for query in Query::all() {
+            for (escaped, answer) in escaped.iter_mut().zip(accel.ask(query, number, rays).answers) {
+                *escaped |= !answer.is_hit();
+            }
         }
-    }
-    escaped.iter().filter(|&&escaped| escaped).count() as u64
+        escaped.into_iter().filter(|escaped| *escaped).count() as u64
+    };
+    rays.chunks(GROUP).enumerate().map(of_group).sum()
 }
 
 /// Uniform in the unit ball, without its middle.

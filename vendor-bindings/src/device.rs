@@ -34,7 +34,7 @@ struct State {
     /// Bytes that Embree holds.
     memory: AtomicIsize,
     /// How many calls of opacity filters ended in a panic.
-    filter_panics: AtomicUsize,
+    filter_panics: Arc<AtomicUsize>,
 }
 
 // SAFETY: Embree's device functions may be called from any thread; the state is synchronised.
@@ -106,8 +106,9 @@ impl Device {
         self.0.state.filter_panics.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn count_filter_panic(&self) {
-        self.0.state.filter_panics.fetch_add(1, Ordering::Relaxed);
+    /// What [`Device::filter_panics`] reads.
+    pub(crate) fn filter_panic_counter(&self) -> Arc<AtomicUsize> {
+        self.0.state.filter_panics.clone()
     }
 
     pub(crate) fn handle(&self) -> RTCDevice {
@@ -202,6 +203,7 @@ mod tests {
     /// safe layer lets no mistake through that could be made here, so the raw functions make one: a
     /// buffer that is not aligned.
     #[test]
+    #[cfg_attr(miri, ignore = "calls Embree")]
     fn errors_carry_embrees_text() {
         let Ok(library) = Library::load() else {
             if std::env::var_os("REQUIRE_EMBREE").is_some() {
@@ -241,5 +243,33 @@ mod tests {
         assert!(text.contains("align"), "{text}");
         assert!(error.to_string().contains(text), "{error}");
         assert_eq!(device.check("do nothing"), Ok(()));
+    }
+
+    /// Embree hands its callbacks a pointer and a text, which may be missing, from any thread.
+    #[test]
+    fn callbacks_reach_the_state_through_their_pointer() {
+        let state = Box::<State>::default();
+        let user = ptr::from_ref(&*state).cast_mut().cast::<c_void>();
+        // SAFETY: the state outlives the calls; the texts end in a zero byte or are null.
+        unsafe {
+            on_error(user, v4::RTC_ERROR_UNKNOWN, c"first".as_ptr());
+            on_error(user, v4::RTC_ERROR_UNKNOWN, ptr::null());
+            assert!(on_memory(user, 48, false) && on_memory(user, -16, true));
+        }
+        thread::scope(|scope| {
+            let state = &*state;
+            scope.spawn(move || {
+                let user = ptr::from_ref(state).cast_mut().cast::<c_void>();
+                // SAFETY: as above.
+                unsafe { on_error(user, v4::RTC_ERROR_UNKNOWN, c"elsewhere".as_ptr()) };
+            });
+        });
+        let errors = state.errors.lock().unwrap();
+        assert_eq!(
+            errors.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>(),
+            ["first", "", "elsewhere"]
+        );
+        assert_ne!(errors[0].0, errors[2].0);
+        assert_eq!(state.memory.load(Ordering::Relaxed), 32);
     }
 }

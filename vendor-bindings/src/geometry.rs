@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::filter::{Filter, Opacity};
 use crate::library::call;
 use crate::packet::MAX_COORDINATE;
-use crate::placement::largest_coordinate;
+use crate::placement::{largest_coordinate, without_tiny};
 use crate::scene::Scene;
 
 /// A geometry, ready to be attached to a scene.
@@ -112,6 +112,7 @@ impl Geometry {
             return Err(Error::NestedInstance);
         }
         let largest = largest_coordinate(&to_world).ok_or(Error::Transform)?;
+        let to_world = without_tiny(to_world);
         let device = scene.device();
         let mut geometry = Self::new(device, v4::RTC_GEOMETRY_TYPE_INSTANCE)?;
         geometry.instance = true;

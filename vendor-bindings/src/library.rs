@@ -70,6 +70,25 @@ impl Library {
         Err(Error::NotFound { tried })
     }
 
+    /// Loads one library of every version that is installed, the preferred one first; where `EMBREE_LIB` names one,
+    /// that alone.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Library::load`], where there is none.
+    pub fn load_all() -> Result<Vec<Self>, Error> {
+        let first = Self::load()?;
+        let mut libraries = vec![first];
+        if std::env::var_os(VARIABLE).is_none_or(|name| name.is_empty()) {
+            for library in NAMES.iter().filter_map(|name| Self::open(OsStr::new(name)).ok()) {
+                if libraries.iter().all(|other| other.version().major != library.version().major) {
+                    libraries.push(library);
+                }
+            }
+        }
+        Ok(libraries)
+    }
+
     /// Loads the named library, a path or a name that the dynamic loader knows.
     ///
     /// # Errors

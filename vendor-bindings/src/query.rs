@@ -52,13 +52,17 @@ pub struct Hit {
     pub inst_id: u32,
 }
 
-/// Direction components below this are 0 to Embree's boxes, but not to its packets' frusta, which lose hits over
-/// the difference.
-const TINY: f32 = 1e-18;
+/// Direction components below this part of the largest one become 0, which turns a ray by less than rounding does.
+///
+/// Embree's boxes take what is below 10⁻¹⁸ for 0, its packets' frusta don't, and lose hits over the difference. With
+/// [`MIN_DIRECTION`] none is left; nor in the space of an instance, whose map [has no tiny entries
+/// either](crate::placement::without_tiny).
+const TINY: f32 = 1e-8;
 
 #[inline(always)]
-fn without_tiny(direction: f32) -> f32 {
-    if direction.abs() < TINY { 0.0 } else { direction }
+fn without_tiny([x, y, z]: [f32; 3]) -> [f32; 3] {
+    let limit = TINY * x.abs().max(y.abs()).max(z.abs());
+    [x, y, z].map(|d| if d.abs() < limit { 0.0 } else { d })
 }
 
 /// Per-lane flags as Embree wants them: −1 or 0, aligned for the widest packets.
@@ -97,8 +101,8 @@ impl Valid {
             // No branch, so that it vectorises. No valid lane's is NaN.
             *tnear = if (*valid != 0) & (*tnear < 0.0) { 0.0 } else { *tnear };
         }
-        for directions in [&mut rays.dir_x, &mut rays.dir_y, &mut rays.dir_z] {
-            directions.iter_mut().for_each(|direction| *direction = without_tiny(*direction));
+        for ((x, y), z) in rays.dir_x.iter_mut().zip(&mut rays.dir_y).zip(&mut rays.dir_z) {
+            [*x, *y, *z] = without_tiny([*x, *y, *z]);
         }
         valid
     }
@@ -154,7 +158,7 @@ fn occluded4(coherent: bool) -> v4::RTCOccludedArguments {
 
 #[inline(always)]
 fn raw_ray(ray: &Ray) -> v4::RTCRay {
-    let ([org_x, org_y, org_z], [dir_x, dir_y, dir_z]) = (ray.origin, ray.direction.map(without_tiny));
+    let ([org_x, org_y, org_z], [dir_x, dir_y, dir_z]) = (ray.origin, without_tiny(ray.direction));
     v4::RTCRay {
         org_x,
         org_y,
