@@ -123,7 +123,7 @@ mod tests {
         let filter = Filter { opacity, panics: Arc::default() };
         let user = std::ptr::from_ref(&filter).cast_mut().cast::<c_void>();
         let mut three = [-1; N];
-        let mut arguments = v3::RTCFilterFunctionNArguments {
+        let arguments = v3::RTCFilterFunctionNArguments {
             valid: three.as_mut_ptr(),
             geometryUserPtr: user,
             context: std::ptr::null_mut(),
@@ -132,10 +132,10 @@ mod tests {
             N: N as u32,
         };
         // SAFETY: flags and hits are those of N lanes, and the filter outlives the calls.
-        unsafe { filter3(&mut arguments) };
+        unsafe { filter3(&arguments) };
         assert_eq!(three, [-1, 0, -1, 0]);
         let mut four = [-1, -1, 0, 0];
-        let mut arguments = v4::RTCFilterFunctionNArguments {
+        let arguments = v4::RTCFilterFunctionNArguments {
             valid: four.as_mut_ptr(),
             geometryUserPtr: user,
             context: std::ptr::null_mut(),
@@ -144,7 +144,7 @@ mod tests {
             N: N as u32,
         };
         // SAFETY: as above.
-        unsafe { filter4(&mut arguments) };
+        unsafe { filter4(&arguments) };
         assert_eq!(four, [-1, 0, 0, 0]);
         assert_eq!(filter.panics.load(Ordering::Relaxed), 1);
     }
