@@ -162,7 +162,7 @@ impl Case<'_> {
         options: &BenchOptions,
         report: &mut Report,
     ) -> Result<(), BenchError> {
-        let (side, samples) = if options.quick { (8, 16) } else { (50, 128) };
+        let (side, samples) = if options.quick { (8, 16) } else { (24, 128) };
         let mut table = Table::new(format!("Own error with {} lights", self.lights), &["", "error %"]);
         for configuration in configurations {
             let reference = reference_film(self.setup, self.backend, configuration, side, samples)?;
