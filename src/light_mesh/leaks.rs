@@ -95,7 +95,7 @@ pub fn keep_visible<A: Accel>(
             packet.set_lane(lane, &Ray::between(origin, mesh.position(id)));
         }
         let active = ((1u64 << group.len()) - 1) as u32;
-        let lanes = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+        let lanes = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
         blocked.extend((0..group.len()).map(|lane| lanes >> lane & 1 == 1));
     }
     points.keep(|index, _| !blocked[index]);

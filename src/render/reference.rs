@@ -114,7 +114,7 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
                 packet.set_lane(lane, &Ray::between(origin, position));
             }
             let active = ((1u64 << group.len()) - 1) as u32;
-            let blocked = self.accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+            let blocked = self.accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
             seen.extend((0..group.len()).map(|lane| blocked >> lane & 1 == 0));
         }
         seen
