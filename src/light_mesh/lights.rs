@@ -314,18 +314,7 @@ mod tests {
     }
 
     fn surface() -> SurfacePoint {
-        SurfacePoint {
-            position: Vec3::ZERO,
-            offset: 0.0,
-            geometric_normal: Vec3::Y,
-            shading_normal: Vec3::Y,
-            diffuse: Vec3::ONE,
-            specular: Vec3::ZERO,
-            emission: Vec3::ZERO,
-            front: true,
-            two_sided: false,
-            culled: false,
-        }
+        SurfacePoint::white(Vec3::ZERO, Vec3::Y)
     }
 
     /// S(y) by hand: a light straight above at distance 2, one at 60° at distance 2, one below the plane.

@@ -198,19 +198,7 @@ mod tests {
         let mut random = SplitMix64::new(5);
         let surface = |_| {
             let normal = random.in_box(Vec3::NEG_ONE, Vec3::ONE).normalize_or(Vec3::Y);
-            SurfacePoint {
-                // Some of them outside of the points' bounds.
-                position: shift + random.in_box(BOUNDS.min - 0.3, BOUNDS.max + 0.3),
-                offset: 1e-5,
-                geometric_normal: normal,
-                shading_normal: normal,
-                diffuse: Vec3::ONE,
-                specular: Vec3::ZERO,
-                emission: Vec3::ZERO,
-                front: true,
-                two_sided: false,
-                culled: false,
-            }
+            SurfacePoint::white(shift + random.in_box(BOUNDS.min - 0.3, BOUNDS.max + 0.3), normal)
         };
         (0..count).map(surface).collect()
     }

@@ -34,6 +34,22 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
+    /// The front of a white surface without a mirror or light of its own; rays leave it from 10⁻⁵ above.
+    pub fn white(position: Vec3, normal: Vec3) -> Self {
+        Self {
+            position,
+            offset: 1e-5,
+            geometric_normal: normal,
+            shading_normal: normal,
+            diffuse: Vec3::ONE,
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            front: true,
+            two_sided: false,
+            culled: false,
+        }
+    }
+
     /// Start of rays that leave the point on the side from which it was seen.
     #[inline(always)]
     pub fn ray_origin(&self) -> Vec3 {

@@ -121,18 +121,7 @@ pub fn conventional(scene: &Scene, camera: &Camera, settings: &Settings) -> (Fil
 
 /// A surface point of white material in free space.
 pub fn surface_point(position: Vec3, normal: Vec3) -> SurfacePoint {
-    SurfacePoint {
-        position,
-        offset: 1e-5,
-        geometric_normal: normal,
-        shading_normal: normal,
-        diffuse: Vec3::ONE,
-        specular: Vec3::ZERO,
-        emission: Vec3::ZERO,
-        front: true,
-        two_sided: false,
-        culled: false,
-    }
+    SurfacePoint::white(position, normal)
 }
 
 /// I(y) at surface points, which need not lie on any geometry.
