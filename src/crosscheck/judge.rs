@@ -21,10 +21,6 @@ const UNDERFLOW: f64 = 1e-40;
 /// Products beyond this may overflow in single precision.
 const OVERFLOW: f64 = 1e37;
 
-/// How many of its longest edges a triangle may be away for its neighbours' sake, with which it is tested: one that
-/// is seen edge-on is said to be hit from there, since all that is computed of it is rounding.
-const NEIGHBOURS: f64 = 16.0;
-
 /// A triangle that a ray hits, or that it may be said to hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -273,11 +269,6 @@ impl Crossing {
         let lengths = sides.map(|(p, q)| (corners[q] - corners[p]).length_squared());
         let longest = lengths.into_iter().fold(0.0, f64::max).sqrt();
         let distances = flat.map(|[x, y]| x * x + y * y);
-        // Boxes keep ray tracers from triangles that are nowhere near.
-        let far = NEIGHBOURS * longest + 4.0 * moved;
-        if distances.into_iter().fold(f64::INFINITY, f64::min) > far * far {
-            return None;
-        }
         let (lengths, distances) = (lengths.map(f64::sqrt), distances.map(f64::sqrt));
         let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
         let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
