@@ -69,6 +69,43 @@ fn a_box_with_an_open_side_is_seen_through_it() {
     assert!(loaded.scene.lights.iter().all(|light| light.position.cmpgt(Vec3::ZERO).all()));
 }
 
+/// Six rooms in two rows, each closed: from none is half of them to be seen, and from outside
+/// there are only backs. Cut open, all of them are in view, and lit.
+#[test]
+fn a_maze_is_seen_cut_open() {
+    let mut builder = Builder::default();
+    for room in 0..6u8 {
+        let corner = Vec3::new(f32::from(room) * 5.0, 0.0, f32::from(room % 2) * 7.0);
+        builder.cuboid(corner, corner + Vec3::new(4.0, 3.0, 6.0), true, 0);
+    }
+    let loaded = viewed(builder, BackendChoice::Bvh);
+    let scene = &loaded.scene;
+    assert!(!is_inside(scene, loaded.cameras[0].position), "{:?}", loaded.cameras[0]);
+    assert!(scene.materials.iter().all(|material| material.cull));
+    for room in 0..6u8 {
+        let middle = Vec3::new(f32::from(room) * 5.0 + 2.0, 1.5, f32::from(room % 2) * 7.0 + 3.0);
+        let is_near = |x: Vec3| (x - middle).abs().cmple(Vec3::new(2.0, 1.5, 3.0)).all();
+        assert!(scene.lights.iter().any(|light| is_near(light.position)), "room {room} stays dark");
+    }
+}
+
+/// A court of 12 × 8 with walls all around: from the side the nearer wall would hide it.
+#[test]
+fn rooms_without_ceilings_are_looked_down_into() {
+    let mut builder = Builder::default();
+    let (x, y, z) = (Vec3::X * 12.0, Vec3::Y * 3.0, Vec3::Z * 8.0);
+    builder.quad(Vec3::ZERO, z, x, 0);
+    builder.quad(Vec3::ZERO, y, z, 0);
+    builder.quad(x, z, y, 0);
+    builder.quad(Vec3::ZERO, x, y, 0);
+    builder.quad(z, y, x, 0);
+    let loaded = viewed(builder, BackendChoice::Bvh);
+    let camera = &loaded.cameras[0];
+    let down = (camera.position - camera.look_at).normalize().y;
+    assert!(down > 0.6 && !is_inside(&loaded.scene, camera.position), "{camera:?}");
+    assert!(loaded.scene.materials.iter().all(|material| !material.cull));
+}
+
 /// Inside a solid thing there are only backs; beside it there is no room.
 #[test]
 fn a_thing_is_seen_from_outside() {

@@ -140,6 +140,10 @@ fn scene_file(
         line("\n# The model has no lights: these go with the camera.".to_owned());
         loaded.scene.lights.iter().for_each(|light| line(light_table(light)));
     }
+    if loaded.scene.materials.iter().any(|material| material.cull) {
+        line("\n# The rooms are shown cut open: rays of sight pass through the backs of walls.".to_owned());
+        line("[[material]]\ncull = true".to_owned());
+    }
     text
 }
 

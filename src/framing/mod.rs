@@ -1,8 +1,8 @@
 //! The view of a model that brings no camera: chosen by what rays find, the same every time.
 //!
 //! A model that is looked at, such as a figure, is framed from outside. A model that is lived in, such as a room, shows
-//! nothing from outside: it is seen through its open side if it has one, otherwise from where much of it is in view.
-//! Which of the two it is, lines through the model tell.
+//! nothing from outside: it is seen through its open side if it has one, from above if it has no ceiling, cut open if
+//! it is a maze, otherwise from where much of it is in view. Which of them it is, lines through the model tell.
 
 mod inside;
 mod lamps;
@@ -23,10 +23,14 @@ pub fn complete_view(opened: &mut OpenedScene, backend: &Backend) {
     let aspect = width as f32 / height as f32;
     if loaded.cameras.is_empty() {
         let view = with_accel!(backend, accel => {
-            choose(&Probe { accel, scene: &loaded.scene, bounds: loaded.scene.bounds() }, aspect)
+            let probe = Probe { accel, scene: &loaded.scene, bounds: loaded.scene.bounds() };
+            choose(&probe, aspect, *bare)
         });
         choices.push(format!("no camera in the file: {}", view.how));
         loaded.cameras.push(view.camera);
+        if view.cut_open {
+            loaded.scene.materials.iter_mut().for_each(|material| material.cull = true);
+        }
         if lacks_lights && !view.lamps.is_empty() {
             choices.push(format!("no lights in the file: {} lamps in its rooms", view.lamps.len()));
             loaded.scene.lights = view.lamps;
@@ -46,6 +50,8 @@ struct View {
     camera: Camera,
     /// In words.
     how: &'static str,
+    /// Whether it shows anything only if backs are culled.
+    cut_open: bool,
     /// Lights for rooms that sunlight doesn't reach.
     lamps: Vec<PointLight>,
 }
@@ -57,27 +63,39 @@ const LIVED_IN: f32 = 0.5;
 /// Rooms without ceilings: the same two shares, if more than a share of what is seen from outside are backs.
 const OPEN_ABOVE: (f32, f32, f32) = (0.5, 0.1, 0.2);
 
-fn choose<A: Accel>(probe: &Probe<A>, aspect: f32) -> View {
+/// Rooms that have nothing around them, if at least this share of what is seen from outside are backs.
+const BACKS_ONLY: f32 = 0.9;
+/// Rooms that no view from inside tells much about: no position sees this share of the others.
+const SEEN_AT_ONCE: f32 = 0.5;
+
+/// `bare`: whether materials may be changed for it.
+fn choose<A: Accel>(probe: &Probe<A>, aspect: f32, bare: bool) -> View {
     let front = outside::from_the_front(probe, aspect);
+    let from_outside = |camera, how| View { camera, how, cut_open: false, lamps: Vec::new() };
     let rooms = probe.rooms();
-    let (open, lived_in, backs) = OPEN_ABOVE;
-    let eyes = if rooms.share(ENCLOSED) >= LIVED_IN {
-        rooms.enclosed(ENCLOSED)
-    } else if rooms.share(open) >= lived_in && outside::backs(probe, &front) >= backs {
-        rooms.enclosed(open)
-    } else {
-        return View { camera: front, how: "one that frames the model", lamps: Vec::new() };
-    };
-    let lamps = lamps::in_rooms(probe, &eyes);
-    if let Some(camera) = outside::through_an_open_side(probe, aspect) {
-        return View { camera, how: "one that looks in through the open side", lamps };
+    let backs = outside::backs(probe, &front);
+    let (open, lived_in, backs_above) = OPEN_ABOVE;
+    let is_closed = rooms.share(ENCLOSED) >= LIVED_IN;
+    if !is_closed && (rooms.share(open) < lived_in || backs < backs_above) {
+        return from_outside(front, "one that frames the model");
     }
-    match inside::best_view(probe, &eyes, aspect) {
+    let positions = rooms.enclosed(if is_closed { ENCLOSED } else { open });
+    let lamps = lamps::in_rooms(probe, &positions);
+    if let Some(camera) = outside::through_an_open_side(probe, aspect) {
+        return View { lamps, ..from_outside(camera, "one that looks in through the open side") };
+    }
+    if !is_closed {
+        return from_outside(outside::from_above(probe, &positions, aspect), "one that looks down into it");
+    }
+    if bare && backs >= BACKS_ONLY && probe.seen_at_once(&positions) < SEEN_AT_ONCE {
+        let camera = outside::cut_open(probe, aspect);
+        return View { lamps, cut_open: true, ..from_outside(camera, "one that sees the rooms cut open") };
+    }
+    match inside::best_view(probe, &positions, aspect) {
         Some(camera) => View {
-            how: "one inside, where much is in view",
             lamps: lamps::with_one_at(&camera, lamps),
-            camera,
+            ..from_outside(camera, "one inside, where much is in view")
         },
-        None => View { camera: front, how: "one that frames the model", lamps },
+        None => View { lamps, ..from_outside(front, "one that frames the model") },
     }
 }

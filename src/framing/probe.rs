@@ -81,6 +81,19 @@ impl<A: Accel> Probe<'_, A> {
         })
     }
 
+    /// What is seen along a direction (unit length) through the backs of surfaces.
+    pub fn look_through(&self, origin: Vec3, direction: Vec3) -> Option<Sight> {
+        let mut origin = origin;
+        for _ in 0..SURFACES {
+            let sight = self.look(origin, direction)?;
+            if sight.front {
+                return Some(sight);
+            }
+            origin = sight.far;
+        }
+        None
+    }
+
     /// Looks for room along random lines: between two fronts that face each other. Inside a solid thing there are only
     /// backs.
     pub fn rooms(&self) -> Rooms {
@@ -138,6 +151,13 @@ impl<A: Accel> Probe<'_, A> {
     /// Whether nothing lies between two positions.
     pub fn sees(&self, from: Vec3, to: Vec3) -> bool {
         !self.accel.occluded(&Ray::between(from, to))
+    }
+
+    /// The largest share of some positions that one of them sees.
+    pub fn seen_at_once(&self, positions: &[Vec3]) -> f32 {
+        let seen = |from: Vec3| positions.iter().filter(|&&to| self.sees(from, to)).count();
+        let most = positions.iter().map(|&from| seen(from)).max().unwrap_or(0);
+        most as f32 / positions.len().max(1) as f32
     }
 
     /// Share of the directions above a surface that end on other surfaces.
