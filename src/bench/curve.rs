@@ -30,18 +30,17 @@ struct Sizes {
     /// of the timed picture: errors need no frame of their own.
     error_side: u32,
     reference_samples: u32,
-    spacings: &'static [f32],
-    radii: &'static [f32],
+    /// R, and spacings in the same proportions to it: the error hangs on their ratio.
+    meshes: &'static [(f32, &'static [f32])],
 }
 
 impl Sizes {
     fn of(options: &BenchOptions) -> Self {
         if options.quick {
-            let (spacings, radii): (&[f32], &[f32]) = (&[1.0], &[1.5]);
-            Self { time_side: 48, error_side: 16, reference_samples: 16, spacings, radii }
+            Self { time_side: 48, error_side: 16, reference_samples: 16, meshes: &[(1.5, &[1.0])] }
         } else {
-            let spacings = &[0.75, 0.6, 0.45, 0.3];
-            Self { time_side: 600, error_side: 40, reference_samples: 128, spacings, radii: &[0.75, 1.5] }
+            let meshes: &[(f32, &[f32])] = &[(0.75, &[0.75, 0.6, 0.45, 0.3]), (1.5, &[1.5, 1.2, 0.9, 0.6])];
+            Self { time_side: 600, error_side: 40, reference_samples: 128, meshes }
         }
     }
 }
@@ -56,13 +55,9 @@ pub fn measure(
 ) -> Result<Vec<Tried>, BenchError> {
     let sizes = Sizes::of(options);
     let mut all = Vec::new();
-    for &radius in sizes.radii {
-        let configuration = |estimator| Configuration {
-            estimator,
-            layout: LAYOUTS[0].clone(),
-            spacing: sizes.spacings[0],
-            radius,
-        };
+    for &(radius, spacings) in sizes.meshes {
+        let configuration =
+            |estimator| Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: radius, radius };
         let reference = |estimator| {
             log(&format!("reference for {} at R {radius}", estimator_name(estimator)));
             reference_film(
@@ -98,7 +93,7 @@ pub fn measure(
                     label: format!("{} {}", estimator_name(estimator), layout_name(layout)),
                     points: Vec::new(),
                 };
-                for &spacing in sizes.spacings.iter().filter(|&&spacing| spacing <= radius) {
+                for &spacing in spacings {
                     let layout = layout.clone();
                     let configuration = Configuration { estimator, layout, spacing, radius };
                     let tried = attempt(setup, backend, configuration, &sizes, [&own, &exact], report)?;
