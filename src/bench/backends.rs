@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::report::{Plot, Report, Series, Table};
+use super::report::{Aim, Goal, Plot, Report, Series, Table};
 use super::setup::{PAPER_TRIANGLES, Setup, forest, new_report};
 use super::timing::{Samples, timed};
 use super::{BenchError, BenchOptions};
@@ -26,6 +26,9 @@ struct Bundle {
 /// Packet widths; 1 stands for queries of single rays.
 const WIDTHS: [usize; 4] = [1, 4, 8, 16];
 
+/// What the BVH is to reach of Embree's rate, with single rays and with the best packets.
+const GOALS: [(&str, f64); 2] = [("single rays", 0.8), ("best packet", 0.6)];
+
 /// Runs the measurement.
 pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchError> {
     let sizes: &[u32] = if options.quick { &[2_000] } else { &[PAPER_TRIANGLES, 2_000_000] };
@@ -33,58 +36,79 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
     for &triangles in sizes {
         let setup = forest(triangles, if options.quick { 16 } else { 100 })?;
         let bundles = bundles(&setup, if options.quick { 1 << 10 } else { 1 << 20 });
+        let mut contestants = Vec::new();
         for choice in [BackendChoice::Embree, BackendChoice::Bvh] {
             log(&format!("{choice:?}, {triangles} triangles"));
-            measure(&setup, choice, &bundles, options, &mut report, log)?;
+            contestants.extend(Contestant::build(&setup, choice, options, &mut report, log)?);
         }
+        measure(contestants, &bundles, options, &mut report)?;
     }
     Ok(report)
 }
 
+/// A backend with the scene built.
+struct Contestant {
+    /// Backend, version, triangles.
+    name: String,
+    backend: Backend,
+    table: Table,
+    plot: Plot,
+}
+
+impl Contestant {
+    /// Times the build; `None` where Embree is not there.
+    fn build(
+        setup: &Setup,
+        choice: BackendChoice,
+        options: &BenchOptions,
+        report: &mut Report,
+        log: &dyn Fn(&str),
+    ) -> Result<Option<Self>, BenchError> {
+        let triangles = setup.scene.triangle_count();
+        let mut builds = Vec::new();
+        let mut built = None;
+        for _ in 0..options.repetitions.min(3) {
+            drop(built.take());
+            let (seconds, chosen) = timed(|| Backend::build(choice, &setup.scene));
+            match chosen {
+                Ok(chosen) => built = Some(chosen.backend),
+                Err(error) if choice == BackendChoice::Embree => {
+                    log(&format!("left out: {error}"));
+                    return Ok(None);
+                }
+                Err(error) => return Err(error.into()),
+            }
+            builds.push(seconds);
+        }
+        let Some(backend) = built else { return Ok(None) };
+        let name = format!("{backend}, {triangles} triangles");
+        let build = report.record(format!("{name}: build"), builds);
+        let bytes = with_accel!(&backend, accel => accel.memory_bytes());
+        let title = format!(
+            "{name}: Mray/s by packet width; built in {build:.3} s, {:.0} bytes per triangle",
+            bytes as f64 / triangles as f64
+        );
+        let plot = Plot {
+            title: format!("Rays per second: {name}"),
+            x: "packet width".to_owned(),
+            y: "Mray/s".to_owned(),
+            series: Vec::new(),
+        };
+        Ok(Some(Self { name, backend, table: Table::new(title, &["rays", "1", "4", "8", "16"]), plot }))
+    }
+}
+
+/// Rates of all backends, packet widths and kinds of rays. Those of one kind are measured in turn.
 fn measure(
-    setup: &Setup,
-    choice: BackendChoice,
+    mut contestants: Vec<Contestant>,
     bundles: &[Bundle],
     options: &BenchOptions,
     report: &mut Report,
-    log: &dyn Fn(&str),
 ) -> Result<(), BenchError> {
-    let triangles = setup.scene.triangle_count();
-    let mut builds = Vec::new();
-    let mut built = None;
-    for _ in 0..options.repetitions.min(3) {
-        drop(built.take());
-        let (seconds, chosen) = timed(|| Backend::build(choice, &setup.scene));
-        match chosen {
-            Ok(chosen) => built = Some(chosen.backend),
-            Err(error) if choice == BackendChoice::Embree => {
-                log(&format!("left out: {error}"));
-                return Ok(());
-            }
-            Err(error) => return Err(error.into()),
-        }
-        builds.push(seconds);
-    }
-    let Some(backend) = built else { return Ok(()) };
-    let name = format!("{backend}, {triangles} triangles");
-    let build = report.record(format!("{name}: build"), builds);
-    let bytes = with_accel!(&backend, accel => accel.memory_bytes());
-    let mut table = Table::new(
-        format!(
-            "{name}: Mray/s by packet width; built in {build:.3} s, {:.0} bytes per triangle",
-            bytes as f64 / triangles as f64
-        ),
-        &["rays", "1", "4", "8", "16"],
-    );
-    let mut plot = Plot {
-        title: format!("Rays per second: {name}"),
-        x: "packet width".to_owned(),
-        y: "Mray/s".to_owned(),
-        series: Vec::new(),
-    };
     for bundle in bundles {
-        let times = options.budget().alternate(WIDTHS.len(), |variant| {
-            let (seconds, _) = with_accel!(&backend, accel => timed(|| match WIDTHS[variant] {
+        let times = options.budget().alternate(contestants.len() * WIDTHS.len(), |variant| {
+            let Contestant { backend, .. } = &contestants[variant / WIDTHS.len()];
+            let (seconds, _) = with_accel!(backend, accel => timed(|| match WIDTHS[variant % WIDTHS.len()] {
                 4 => packets::<_, 4>(accel, bundle),
                 8 => packets::<_, 8>(accel, bundle),
                 16 => packets::<_, 16>(accel, bundle),
@@ -92,19 +116,33 @@ fn measure(
             }));
             Ok::<_, BenchError>(seconds)
         })?;
-        let mut row = vec![bundle.name.to_owned()];
-        let mut series = Series { label: bundle.name.to_owned(), points: Vec::new() };
-        for (width, seconds) in WIDTHS.iter().zip(times) {
-            let rate = bundle.rays.len() as f64 / 1e6 / Samples(seconds.clone()).median();
-            report.record(format!("{name}: {}: width {width}", bundle.name), seconds);
-            row.push(format!("{rate:.2}"));
-            series.points.push((*width as f64, rate));
+        let mut rates = Vec::new();
+        for (Contestant { name, table, plot, .. }, times) in
+            contestants.iter_mut().zip(times.chunks(WIDTHS.len()))
+        {
+            let rate = |(width, seconds): (&usize, &Vec<f64>)| {
+                report.record(format!("{name}: {}: width {width}", bundle.name), seconds.clone());
+                bundle.rays.len() as f64 / 1e6 / Samples(seconds.clone()).median()
+            };
+            let rate: Vec<f64> = WIDTHS.iter().zip(times).map(rate).collect();
+            let cells = rate.iter().map(|rate| format!("{rate:.2}"));
+            table.rows.push(std::iter::once(bundle.name.to_owned()).chain(cells).collect());
+            let points = WIDTHS.iter().zip(&rate).map(|(&width, &rate)| (width as f64, rate)).collect();
+            plot.series.push(Series { label: bundle.name.to_owned(), points });
+            let best_packet = rate[1..].iter().copied().fold(0.0, f64::max);
+            rates.push([rate[0], best_packet]);
         }
-        table.rows.push(row);
-        plot.series.push(series);
+        if let [embree, bvh] = rates.as_slice() {
+            for ((form, goal), (embree, bvh)) in GOALS.iter().zip(embree.iter().zip(bvh)) {
+                let name = format!("BVH over {}, {}, {form}", contestants[0].name, bundle.name);
+                report.goals.push(Goal::new(name, bvh / embree, Aim::AtLeast, *goal));
+            }
+        }
     }
-    report.tables.push(table);
-    report.plots.push(plot);
+    for Contestant { table, plot, .. } in contestants {
+        report.tables.push(table);
+        report.plots.push(plot);
+    }
     Ok(())
 }
 
