@@ -311,3 +311,15 @@ fn escapes_are_counted() {
         assert_eq!(result.rows.iter().map(|row| row.rays).sum::<u64>(), 30_000);
     }
 }
+
+/// A ray in a triangle's plane gets edge functions of pure rounding wherever the triangle is, and a lane of a
+/// coherent packet is tested with all that the other lanes come near. A little off the plane nothing excuses the hit.
+#[test]
+fn only_what_is_seen_edge_on_may_be_hit_from_afar() {
+    let scene = square(None);
+    let claimed = |_: &Ray, _| Some(Hit { t: 0.25, u: 0.0, v: 0.0, instance: 0, triangle: 0 });
+    // Sixty edges aside, where its line never meets the square.
+    let beside = |z| Ray::new(Vec3::new(-1.0, 60.0, z), Vec3::X);
+    assert_eq!(judged(&scene, beside(0.0), claimed).0, IN_PLANE);
+    assert_eq!(judged(&scene, beside(0.01), claimed).0, UNEXPLAINED);
+}

@@ -7,12 +7,16 @@ use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::complete_view;
 use lightmesh::scene::load::{LoadedScene, OpenedScene, Skipped};
-use lightmesh::scene::{Falloff, LightShape, Scene};
+use lightmesh::scene::{Falloff, LightShape, Material, Scene};
 use lightmesh::settings::Settings;
 
 /// Chooses camera and lights.
 fn viewed(builder: Builder, choice: BackendChoice) -> LoadedScene {
-    let scene = builder.scene(vec![grey(0.8)], Vec::new(), Falloff::InverseSquare);
+    viewed_with(builder, grey(0.8), choice)
+}
+
+fn viewed_with(builder: Builder, material: Material, choice: BackendChoice) -> LoadedScene {
+    let scene = builder.scene(vec![material], Vec::new(), Falloff::InverseSquare);
     let backend = Backend::build(choice, &scene).unwrap().backend;
     let loaded = LoadedScene {
         scene,
@@ -69,16 +73,21 @@ fn a_box_with_an_open_side_is_seen_through_it() {
     assert!(loaded.scene.lights.iter().all(|light| light.position.cmpgt(Vec3::ZERO).all()));
 }
 
-/// Six rooms in two rows, each closed: from none is half of them to be seen, and from outside
-/// there are only backs. Cut open, all of them are in view, and lit.
-#[test]
-fn a_maze_is_seen_cut_open() {
+/// Six rooms in two rows, each closed.
+fn maze() -> Builder {
     let mut builder = Builder::default();
     for room in 0..6u8 {
         let corner = Vec3::new(f32::from(room) * 5.0, 0.0, f32::from(room % 2) * 7.0);
         builder.cuboid(corner, corner + Vec3::new(4.0, 3.0, 6.0), true, 0);
     }
-    let loaded = viewed(builder, BackendChoice::Bvh);
+    builder
+}
+
+/// From no position half of a maze is to be seen, and from outside there are only backs. Cut open, all of it is in view,
+/// and lit.
+#[test]
+fn a_maze_is_seen_cut_open() {
+    let loaded = viewed(maze(), BackendChoice::Bvh);
     let scene = &loaded.scene;
     assert!(!is_inside(scene, loaded.cameras[0].position), "{:?}", loaded.cameras[0]);
     assert!(scene.materials.iter().all(|material| material.cull));
@@ -87,6 +96,14 @@ fn a_maze_is_seen_cut_open() {
         let is_near = |x: Vec3| (x - middle).abs().cmple(Vec3::new(2.0, 1.5, 3.0)).all();
         assert!(scene.lights.iter().any(|light| is_near(light.position)), "room {room} stays dark");
     }
+}
+
+/// Two-sided walls have no back to look through.
+#[test]
+fn a_maze_with_two_sided_walls_is_seen_from_inside() {
+    let loaded = viewed_with(maze(), Material { two_sided: true, ..grey(0.8) }, BackendChoice::Bvh);
+    assert!(is_inside(&loaded.scene, loaded.cameras[0].position), "{:?}", loaded.cameras[0]);
+    assert!(loaded.scene.materials.iter().all(|material| !material.cull));
 }
 
 /// A court of 12 × 8 with walls all around: from the side the nearer wall would hide it.

@@ -151,6 +151,8 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
 
     let mut left = disagreements.as_slice();
     let mut classes = vec![Class::Agree; subjects.len()];
+    // Whether one of the subject's nearest hits that differ is in order.
+    let mut named = vec![false; subjects.len()];
     // What has been said of the same ray already; most queries answer the same.
     let mut judged: Vec<(Answer, Option<Class>)> = Vec::new();
     for (index, (ray, reference)) in rays.iter().zip(&reference).enumerate() {
@@ -163,6 +165,7 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
         checked.audited += u64::from(found.is_empty());
         let truth = judge.truth(ray);
         classes.fill(Class::Agree);
+        named.fill(false);
         judged.clear();
         let mut complain = |subject: usize, query: Query, answer: Option<Answer>| {
             if checked.unexplained.len() < KEPT {
@@ -196,8 +199,10 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
                 judged.push((answer, class));
                 class
             });
-            // What stands in the way is named by the nearest hits, which came first.
-            let edge_on = *answer == Some(Answer::Occluded(true)) && classes[*subject] == Class::InPlane;
+            // What stands in the way is named by the nearest hits, which came first. If the truth knows of nothing
+            // there, it is seen edge-on from afar.
+            named[*subject] |= class.is_some() && matches!(answer, Some(Answer::Nearest(Some(_))));
+            let edge_on = *answer == Some(Answer::Occluded(true)) && named[*subject];
             let class = class.or(edge_on.then_some(Class::InPlane));
             // The first query that fails tells enough.
             if class.is_none() && classes[*subject] != Class::Unexplained {

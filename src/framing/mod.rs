@@ -24,7 +24,9 @@ pub fn complete_view(opened: &mut OpenedScene, backend: &Backend) {
     if loaded.cameras.is_empty() {
         let view = with_accel!(backend, accel => {
             let probe = Probe { accel, scene: &loaded.scene, bounds: loaded.scene.bounds() };
-            choose(&probe, aspect, *bare)
+            // Materials may be changed for a view of a bare model only, and two-sided ones have no back.
+            let can_cull = *bare && loaded.scene.materials.iter().all(|material| !material.two_sided);
+            choose(&probe, aspect, can_cull)
         });
         choices.push(format!("no camera in the file: {}", view.how));
         loaded.cameras.push(view.camera);
@@ -68,8 +70,8 @@ const BACKS_ONLY: f32 = 0.9;
 /// Rooms that no view from inside tells much about: no position sees this share of the others.
 const SEEN_AT_ONCE: f32 = 0.5;
 
-/// `bare`: whether materials may be changed for it.
-fn choose<A: Accel>(probe: &Probe<A>, aspect: f32, bare: bool) -> View {
+/// `can_cull`: whether rays of sight may be let through the backs of all materials.
+fn choose<A: Accel>(probe: &Probe<A>, aspect: f32, can_cull: bool) -> View {
     let front = outside::from_the_front(probe, aspect);
     let from_outside = |camera, how| View { camera, how, cut_open: false, lamps: Vec::new() };
     let rooms = probe.rooms();
@@ -87,7 +89,7 @@ fn choose<A: Accel>(probe: &Probe<A>, aspect: f32, bare: bool) -> View {
     if !is_closed {
         return from_outside(outside::from_above(probe, &positions, aspect), "one that looks down into it");
     }
-    if bare && backs >= BACKS_ONLY && probe.seen_at_once(&positions) < SEEN_AT_ONCE {
+    if can_cull && backs >= BACKS_ONLY && probe.seen_at_once(&positions) < SEEN_AT_ONCE {
         let camera = outside::cut_open(probe, aspect);
         return View { lamps, cut_open: true, ..from_outside(camera, "one that sees the rooms cut open") };
     }

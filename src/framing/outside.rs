@@ -20,9 +20,9 @@ const MARGIN: f32 = 1.05;
 const RASTER: (u32, u32) = (32, 24);
 /// Towards the camera from rooms that are looked down into: steep, so that they hide little of each other.
 const ABOVE: Vec3 = Vec3::new(0.3, 1.0, 0.8);
-/// Directions in which a position's room is measured, and the share of what is found at either end that is left out:
-/// what shows through doors.
+/// Directions in which a position's room is measured.
 const DIRECTIONS: u32 = 48;
+/// Share of what is found there that is left out at either end: what shows through doors.
 const DOORS: f32 = 0.02;
 /// Share of the surfaces in view that must be sheltered for a side to count as open.
 const OPEN: f32 = 0.7;
