@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::filter::{Filter, Opacity};
 use crate::library::call;
 use crate::packet::MAX_COORDINATE;
-use crate::placement::{largest_coordinate, without_tiny};
+use crate::placement::largest_coordinate;
 use crate::scene::Scene;
 
 /// A geometry, ready to be attached to a scene.
@@ -184,4 +184,19 @@ impl Drop for Geometry {
         // own reference first (see `scene::Inner`).
         unsafe { call!(self.device.api(), rtcReleaseGeometry(self.handle)) }
     }
+}
+
+/// Entries below this part of the largest one of their column become 0.
+const TINY: f32 = f32::EPSILON;
+
+/// The map without the remains of rounding that turns by quaternions leave where there should be 0, such as 10⁻¹⁷:
+/// they make components of directions tiny, and [Embree's packets lose hits](crate::query) over those.
+///
+/// That moves a point by no more than rounding does, by a few 10⁻⁷ of its distance from the instance's own origin.
+fn without_tiny([x, y, z, origin]: [[f32; 3]; 4]) -> [[f32; 3]; 4] {
+    let [x, y, z] = [x, y, z].map(|axis| {
+        let limit = TINY * axis.iter().fold(0.0f32, |largest, entry| largest.max(entry.abs()));
+        axis.map(|entry| if entry.abs() < limit { 0.0 } else { entry })
+    });
+    [x, y, z, origin]
 }

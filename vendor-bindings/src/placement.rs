@@ -1,4 +1,4 @@
-//! Placements of instances: which can be undone, and what Embree gets of them.
+//! Placements of instances: which can be undone.
 
 use crate::packet::MAX_COORDINATE;
 
@@ -33,19 +33,4 @@ pub fn largest_coordinate(to_world: &[[f32; 3]; 4]) -> Option<f32> {
         largest = largest.min((0.5 * f64::from(MAX_COORDINATE) - offset) / factor);
     }
     (largest >= 1e9).then_some(largest as f32)
-}
-
-/// Entries below this part of the largest one of their column become 0.
-const TINY: f32 = f32::EPSILON;
-
-/// The map without the remains of rounding that turns by quaternions leave where there should be 0, such as 10⁻¹⁷:
-/// they make components of directions tiny, and [Embree's packets lose hits](crate::query) over those.
-///
-/// That moves a point by no more than rounding does, by a few 10⁻⁷ of its distance from the instance's own origin.
-pub(crate) fn without_tiny([x, y, z, origin]: [[f32; 3]; 4]) -> [[f32; 3]; 4] {
-    let [x, y, z] = [x, y, z].map(|axis| {
-        let limit = TINY * axis.iter().fold(0.0f32, |largest, entry| largest.max(entry.abs()));
-        axis.map(|entry| if entry.abs() < limit { 0.0 } else { entry })
-    });
-    [x, y, z, origin]
 }

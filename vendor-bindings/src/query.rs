@@ -56,7 +56,7 @@ pub struct Hit {
 ///
 /// Embree's boxes take what is below 10⁻¹⁸ for 0, its packets' frusta don't, and lose hits over the difference. With
 /// [`MIN_DIRECTION`] none is left; nor in the space of an instance, whose map [has no tiny entries
-/// either](crate::placement::without_tiny).
+/// either](crate::geometry).
 const TINY: f32 = 1e-8;
 
 #[inline(always)]
