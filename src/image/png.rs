@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use ::png::{BitDepth, ColorType, Decoder, Encoder, SrgbRenderingIntent, Transformations};
+use ::png::{BitDepth, ColorType, Compression, Decoder, Encoder, SrgbRenderingIntent, Transformations};
+use rayon::prelude::*;
 
 use super::tone::{linear_from_srgb, tone_map_8_bit};
 use super::{DecodeError, Image, MAX_PIXELS};
@@ -25,7 +26,7 @@ pub fn encode(
     exposure: f32,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, ::png::EncodingError> {
-    let rgb: Vec<[u8; 3]> = image.pixels().iter().map(|&pixel| tone_map_8_bit(pixel, exposure)).collect();
+    let rgb: Vec<[u8; 3]> = image.pixels().par_iter().map(|&pixel| tone_map_8_bit(pixel, exposure)).collect();
     encode_rgb8(image.width(), image.height(), &rgb, metadata)
 }
 
@@ -45,6 +46,8 @@ pub fn encode_rgb8(
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    // Balanced compression saves a quarter of the bytes, and takes twenty times as long: longer than to render the picture.
+    encoder.set_compression(Compression::Fast);
     for (key, value) in metadata {
         // tEXt holds Latin-1 only; the newer iTXt holds everything, but fewer programs show it.
         if value.chars().all(|c| u32::from(c) < 256) {
