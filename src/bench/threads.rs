@@ -8,9 +8,10 @@ use super::BenchError;
 use super::BenchOptions;
 use super::configuration::{Configuration, conventional};
 use super::report::{Aim, Goal, Report, Table};
-use super::setup::{Frame, Setup};
+use super::setup::Setup;
 use super::timing::{Budget, Samples, timed};
 use crate::accel::Backend;
+use crate::render::StageSeconds;
 
 /// Stages below this share of the frame are too short to count.
 const SHARE: f64 = 0.05;
@@ -22,13 +23,25 @@ const SHORT: usize = 5;
 
 const THREADS: [&str; 2] = ["1 thread", "2 threads"];
 
-/// Name and time of a stage.
-type Stage = (&'static str, fn(&Frame) -> f64);
+/// One frame, and what the machine gave meanwhile.
+struct Run {
+    /// Seconds that [`arithmetic`] took just before.
+    arithmetic: f64,
+    /// Seconds of the whole frame.
+    frame: f64,
+    stages: StageSeconds,
+}
 
-const STAGES: [Stage; 3] = [
-    ("paths", |frame| frame.stats.seconds.paths),
-    ("mesh", |frame| frame.stats.seconds.mesh),
-    ("shade", |frame| frame.stats.seconds.shade),
+/// Name and time of something that is measured, and whether it is a stage of the frame.
+type Part = (&'static str, fn(&Run) -> f64, bool);
+
+/// The arithmetic stands beside the stages because it has no limits but the machine's: processors may share a core, or be
+/// lent to others, and that changes from minute to minute.
+const PARTS: [Part; 4] = [
+    ("arithmetic alone, meanwhile", |run| run.arithmetic, false),
+    ("paths", |run| run.stages.paths, true),
+    ("mesh", |run| run.stages.mesh, true),
+    ("shade", |run| run.stages.shade, true),
 ];
 
 /// Work without memory, in 64 equal parts.
@@ -42,7 +55,7 @@ fn arithmetic() -> f64 {
         }
         sums.iter().sum::<f64>()
     };
-    (0..64u32).into_par_iter().map(part).sum()
+    (0..64u32).into_par_iter().with_max_len(1).map(part).sum()
 }
 
 /// Times frames on one thread and on two, stage by stage.
@@ -59,44 +72,35 @@ pub fn measure(
     let pools = [one?, two?];
     let mut table =
         Table::new(format!("Threads, {side}×{side}"), &["stage", "1 thread", "2 threads", "times faster"]);
-    // What the machine gives at best: processors may share a core, or be lent to others.
     let budget = options.budget();
     let often = Budget { repetitions: SHORT * budget.repetitions, ..budget };
-    let times = often.alternate(2, |variant| {
-        Ok::<_, BenchError>(pools[variant].install(|| timed(|| black_box(arithmetic())).0))
-    })?;
-    let [one, two] = [0, 1].map(|variant| {
-        report.record(format!("threads: arithmetic alone: {}", THREADS[variant]), times[variant].clone())
-    });
-    table.rows.push(vec![
-        "arithmetic alone, what this machine gives".to_owned(),
-        format!("{one:.4}"),
-        format!("{two:.4}"),
-        format!("{:.2}", one / two),
-    ]);
-
     for (name, settings, budget) in [
         ("light-mesh", configuration.settings(&setup.settings, (side, side)), often),
         ("conventional", conventional(&setup.settings, (side, side)), budget),
     ] {
-        let frames =
-            budget.alternate(2, |variant| pools[variant].install(|| setup.frame(backend, &settings)))?;
-        let total = Samples(frames[1].iter().map(|frame| frame.seconds).collect()).median();
-        for (stage, seconds) in STAGES {
+        let runs = budget.alternate(2, |variant| {
+            pools[variant].install(|| {
+                let arithmetic = timed(|| black_box(arithmetic())).0;
+                let frame = setup.frame(backend, &settings)?;
+                Ok::<_, BenchError>(Run { arithmetic, frame: frame.seconds, stages: frame.stats.seconds })
+            })
+        })?;
+        let total = Samples(runs[1].iter().map(|run| run.frame).collect()).median();
+        for (part, seconds, is_stage) in PARTS {
             let mut medians = [0.0; 2];
-            for ((median, frames), threads) in medians.iter_mut().zip(&frames).zip(THREADS) {
-                let times = frames.iter().map(seconds).collect();
-                *median = report.record(format!("threads: {name}: {stage}: {threads}"), times);
+            for ((median, runs), threads) in medians.iter_mut().zip(&runs).zip(THREADS) {
+                let times = runs.iter().map(seconds).collect();
+                *median = report.record(format!("threads: {name}: {part}: {threads}"), times);
             }
             let [one, two] = medians;
             table.rows.push(vec![
-                format!("{name}: {stage}"),
+                format!("{name}: {part}"),
                 format!("{one:.4}"),
                 format!("{two:.4}"),
                 format!("{:.2}", one / two),
             ]);
-            if two > SHARE * total {
-                let name = format!("two threads over one, {name}, {stage}");
+            if is_stage && two > SHARE * total {
+                let name = format!("two threads over one, {name}, {part}");
                 report.goals.push(Goal::new(name, one / two, Aim::AtLeast, GOAL));
             }
         }
