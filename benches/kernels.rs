@@ -66,7 +66,7 @@ fn surfaces() -> Vec<SurfacePoint> {
     let mut random = SplitMix64::new(2);
     let surface = |_| {
         let normal = random.in_box(Vec3::NEG_ONE, Vec3::ONE).normalize_or(Vec3::Y);
-        SurfacePoint::white(random.in_box(Vec3::splat(0.2), Vec3::splat(0.8)), normal)
+        SurfacePoint::flat(random.in_box(Vec3::splat(0.2), Vec3::splat(0.8)), normal)
     };
     (0..SURFACES).map(surface).collect()
 }

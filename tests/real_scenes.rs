@@ -13,7 +13,7 @@ use lightmesh::accel::{Accel, Backend, Ray};
 use lightmesh::light_mesh::{DirectMesh, Neighbours};
 use lightmesh::render::{CameraRays, Film};
 use lightmesh::scene::load::{LoadedScene, auto_exposure, open_scene};
-use lightmesh::scene::{PointLight, Scene, SurfacePoint};
+use lightmesh::scene::{Interaction, PointLight, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 use lightmesh::with_accel;
 
@@ -36,21 +36,22 @@ fn opened(model: &str) -> Option<LoadedScene> {
 }
 
 /// The surface points in the pixels' centres.
-fn visible<A: Accel>(accel: &A, loaded: &LoadedScene) -> Vec<Option<SurfacePoint>> {
+fn visible<A: Accel>(accel: &A, loaded: &LoadedScene) -> Vec<Option<Interaction>> {
     let rays = CameraRays::new(&loaded.cameras[0], RESOLUTION, 1);
     let pixels = (0..RESOLUTION.1).flat_map(|y| (0..RESOLUTION.0).map(move |x| (x, y)));
     let hit = |(x, y)| {
         let ray = rays.ray(x, y, 0);
-        Some(loaded.scene.surface_point(&accel.intersect(&ray)?, ray.direction))
+        Some(loaded.scene.interaction(&accel.intersect(&ray)?, ray.direction))
     };
     pixels.map(hit).collect()
 }
 
 /// k_d/π · φ2 · E/φ1: what a light adds to a pixel if it is seen.
-fn share(scene: &Scene, light: &PointLight, y: &SurfacePoint) -> Vec3 {
+fn share(scene: &Scene, light: &PointLight, surface: &Interaction) -> Vec3 {
+    let y = &surface.point;
     let offset = light.position - y.position;
     let cosine = y.shading_normal.dot(offset.normalize_or_zero()).max(0.0);
-    y.diffuse / PI * light.intensity * (cosine * scene.falloff.reciprocal(offset.length()))
+    surface.diffuse / PI * light.intensity * (cosine * scene.falloff.reciprocal(offset.length()))
 }
 
 /// Ṽ_i is a mean of V_i(x) over mesh points x of D_y, whichever of them count. So it can differ from V_i(y) only if some
@@ -104,16 +105,17 @@ fn check_bounds(
     with_accel!(backend, accel => {
         let surfaces = visible(accel, loaded);
         // Every seventh pixel: no divisor of the width, so that all columns have their turn.
-        for (pixel, y) in surfaces.iter().enumerate().step_by(7) {
-            let Some(y) = y else { continue };
+        for (pixel, seen) in surfaces.iter().enumerate().step_by(7) {
+            let Some(seen) = seen else { continue };
+            let y = &seen.point;
             mesh.points.neighbours(y, &mut neighbours);
             let sees = |from: Vec3, light: &PointLight| !accel.occluded(&Ray::between(from, light.position));
             let disagrees = |light: &&PointLight| {
                 let truth = sees(y.ray_origin(), light);
                 neighbours.ids().iter().any(|&id| sees(mesh.points.position(id), light) != truth)
             };
-            let facing = scene.lights.iter().filter(|light| share(scene, light, y) != Vec3::ZERO);
-            let bound: Vec3 = facing.filter(disagrees).map(|light| share(scene, light, y)).sum();
+            let facing = scene.lights.iter().filter(|light| share(scene, light, seen) != Vec3::ZERO);
+            let bound: Vec3 = facing.filter(disagrees).map(|light| share(scene, light, seen)).sum();
             checked += 1;
             agreeing += usize::from(bound == Vec3::ZERO);
             for channel in 0..3 {

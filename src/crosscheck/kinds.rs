@@ -216,7 +216,7 @@ impl<'a> RaySource<'a> {
                 None => Ray::new(self.anywhere(random), direction(random)),
             };
             if let Some(hit) = self.tracer.nearest(&ray) {
-                return (ray.direction, self.scene.surface_point(&hit, ray.direction));
+                return (ray.direction, self.scene.interaction(&hit, ray.direction).point);
             }
             pixel = self.pixel(random);
         }
@@ -227,12 +227,6 @@ impl<'a> RaySource<'a> {
             offset: 0.0,
             geometric_normal: normal,
             shading_normal: normal,
-            diffuse: Vec3::ZERO,
-            specular: Vec3::ZERO,
-            emission: Vec3::ZERO,
-            front: true,
-            two_sided: true,
-            culled: false,
         };
         (-normal, point)
     }

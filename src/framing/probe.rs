@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::accel::{Accel, Ray};
 use crate::light_mesh::SphereStrata;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, LightShape, Scene};
+use crate::scene::{Bounds, Interaction, LightShape, Scene};
 
 /// A scene that rays can ask.
 pub struct Probe<'a, A> {
@@ -70,14 +70,14 @@ impl<A: Accel> Probe<'_, A> {
     /// What is seen along a direction (unit length).
     pub fn look(&self, origin: Vec3, direction: Vec3) -> Option<Sight> {
         let hit = self.accel.intersect(&Ray::new(origin, direction))?;
-        let surface = self.scene.surface_point(&hit, direction);
+        let Interaction { point: surface, front, .. } = self.scene.interaction(&hit, direction);
         let offset = surface.geometric_normal * surface.offset;
         Some(Sight {
             distance: hit.t,
             near: surface.position + offset,
             far: surface.position - offset,
             normal: surface.geometric_normal,
-            front: surface.front,
+            front,
         })
     }
 

@@ -92,11 +92,15 @@ impl DirectValues {
         }
         let first = self.bits.len();
         self.bits.resize(first + points.len() * chunks, 0);
-        // Groups of 16 points are the packets; a task gets several, so that tasks are neither many nor long.
+        // Groups of 16 points are the packets; a task gets so many that tasks are neither many nor long: without a limit the
+        // last one, which nobody can help with, is long (see `TILES_PER_TASK` in the renderer).
         const GROUP: usize = LANES;
+        const RAYS_PER_TASK: usize = 1 << 10;
+        let groups_per_task = (RAYS_PER_TASK / (GROUP * lights.len())).max(1);
         self.bits[first..]
             .par_chunks_mut(GROUP * chunks)
             .zip(points.par_chunks(GROUP))
+            .with_max_len(groups_per_task)
             .for_each(|(bits, points)| see_lights(accel, lights, points, bits));
 
         let first_value = self.values.len();

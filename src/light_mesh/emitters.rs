@@ -7,7 +7,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::accel::Hit;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Interaction, Scene, SurfacePoint};
 
 /// The shining triangles of a scene.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,8 @@ pub struct Emitters {
 pub struct EmitterSample {
     /// The point.
     pub surface: SurfacePoint,
+    /// Emiss towards the mesh point.
+    pub emission: Vec3,
     /// Unit direction towards it.
     pub direction: Vec3,
     /// Density of the choice per solid angle at the mesh point.
@@ -104,15 +106,20 @@ impl Emitters {
         }
         let mut hit = Hit { t: 1.0, u: at.x, v: at.y, instance, triangle };
         // Which side shows is known once the point is: the direction decides it.
-        let way = scene.surface_point(&hit, Vec3::Z).position - x;
+        let way = scene.interaction(&hit, Vec3::Z).point.position - x;
         hit.t = way.length();
         let direction = way.try_normalize()?;
-        let surface = scene.surface_point(&hit, direction);
-        if surface.emission == Vec3::ZERO {
+        let Interaction { point: surface, emission, .. } = scene.interaction(&hit, direction);
+        if emission == Vec3::ZERO {
             return None;
         }
         let density = self.density(scene, x, &hit, &surface);
-        (density > 0.0 && density.is_finite()).then_some(EmitterSample { surface, direction, density })
+        (density > 0.0 && density.is_finite()).then_some(EmitterSample {
+            surface,
+            emission,
+            direction,
+            density,
+        })
     }
 }
 

@@ -19,7 +19,7 @@ use super::points::{AUTO_SPACINGS, MeshError, MeshPoints};
 use super::sphere::{SphereStrata, noise};
 use super::store::{NeededPoints, PointMask};
 use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Interaction, Scene, SurfacePoint};
 use crate::settings::{IndirectForm, IndirectSettings, Leaks, Normalization};
 
 /// Rays that an evaluation traced.
@@ -138,8 +138,10 @@ impl IndirectMesh {
         const WIDTH: usize = 16;
         let directions = self.strata.len() as usize;
         let mut hits = vec![None; points.len() * directions];
-        hits.par_chunks_mut(directions * POINTS_PER_TASK).zip(points.par_chunks(POINTS_PER_TASK)).for_each(
-            |(hits, points)| {
+        hits.par_chunks_mut(directions * POINTS_PER_TASK)
+            .zip(points.par_chunks(POINTS_PER_TASK))
+            .with_max_len(1)
+            .for_each(|(hits, points)| {
                 for (hits, &x) in hits.chunks_mut(directions).zip(points) {
                     for (group, hits) in hits.chunks_mut(WIDTH).enumerate() {
                         let mut packet = RayHitPacket::<WIDTH>::empty();
@@ -154,8 +156,7 @@ impl IndirectMesh {
                         }
                     }
                 }
-            },
-        );
+            });
         hits
     }
 
@@ -166,11 +167,11 @@ impl IndirectMesh {
         scene: &Scene,
         x: Vec3,
         hits: &[Option<Hit>],
-        mut each: impl FnMut(usize, Vec3, Option<SurfacePoint>),
+        mut each: impl FnMut(usize, Vec3, Option<Interaction>),
     ) {
         for (cell, hit) in hits.iter().enumerate() {
             let direction = self.strata.jittered(cell as u32, x);
-            each(cell, direction, hit.as_ref().map(|hit| scene.surface_point(hit, direction)));
+            each(cell, direction, hit.as_ref().map(|hit| scene.interaction(hit, direction)));
         }
     }
 
@@ -186,13 +187,14 @@ impl IndirectMesh {
         let parts: Vec<Vec<(u64, u64)>> = points
             .par_chunks(POINTS_PER_TASK * 4)
             .zip(hits.par_chunks(directions * POINTS_PER_TASK * 4))
+            .with_max_len(1)
             .map(|(points, hits)| {
                 let mut needed = NeededPoints::default();
                 let mut neighbours = Neighbours::default();
                 for (&x, hits) in points.iter().zip(hits.chunks(directions)) {
                     self.for_each_hit(scene, x, hits, |_, _, surface| {
                         if let Some(surface) = surface {
-                            mesh.neighbours(&surface, &mut neighbours);
+                            mesh.neighbours(&surface.point, &mut neighbours);
                             neighbours.ids().iter().for_each(|&id| needed.insert(id));
                         }
                     });
@@ -219,10 +221,10 @@ impl IndirectMesh {
             let (x, hits) = (gathering.points[point], &gathering.hits[point * directions..][..directions]);
             self.for_each_hit(scene, x, hits, |cell, direction, surface| {
                 let light = surface.map_or(scene.background, |surface| {
-                    let illumination = direct.illumination(accel, &surface, scratch) * direct_scale;
+                    let illumination = direct.illumination(accel, &surface.point, scratch) * direct_scale;
                     let share = match &hits[cell] {
                         Some(hit) if surface.emission != Vec3::ZERO => {
-                            self.share_of_directions(self.emitters.density(scene, x, hit, &surface))
+                            self.share_of_directions(self.emitters.density(scene, x, hit, &surface.point))
                         }
                         _ => 1.0,
                     };
@@ -241,7 +243,7 @@ impl IndirectMesh {
         let patches = Patches::new(gathering.hits.len(), width, |hit| {
             let x = gathering.points[hit / directions];
             let direction = self.strata.jittered((hit % directions) as u32, x);
-            gathering.hits[hit].as_ref().map(|hit| scene.surface_point(hit, direction))
+            gathering.hits[hit].as_ref().map(|hit| scene.interaction(hit, direction))
         });
         let peak =
             |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
@@ -249,9 +251,9 @@ impl IndirectMesh {
             let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
                 .surfaces
                 .par_iter()
-                .map_init(Scratch::default, |scratch, surface| {
+                .map_init(Scratch::default, |scratch, (surface, diffuse)| {
                     scratch.rays = 0;
-                    (surface.diffuse * self.illumination(accel, surface, scratch), scratch.rays)
+                    (*diffuse * self.illumination(accel, surface, scratch), scratch.rays)
                 })
                 .unzip();
             rays += traced.iter().sum::<u64>();
@@ -304,7 +306,7 @@ impl IndirectMesh {
                 if let Some(sample) = self.emitters.sample(scene, x, k, count, noise) {
                     packet.set_lane(lane, &Ray::between(x, sample.surface.ray_origin()));
                     active |= 1 << lane;
-                    let light = sample.surface.emission * self.share_of_directions(sample.density);
+                    let light = sample.emission * self.share_of_directions(sample.density);
                     found[lane] = (sample.direction, light);
                 }
             }
@@ -332,6 +334,7 @@ impl IndirectMesh {
         let rays = values
             .par_chunks_mut(entries)
             .enumerate()
+            .with_max_len(POINTS_PER_TASK)
             .map_init(NormalSums::default, |sums, (point, values)| {
                 sums.clear();
                 let mut scratch = Scratch::default();

@@ -36,7 +36,7 @@ pub fn is_inside<A: Accel>(accel: &A, scene: &Scene, x: Vec3) -> bool {
     }
     accel.intersect_packet((1 << PROBES) - 1, &mut packet, Coherence::Incoherent);
     let shows_back = |lane: usize| {
-        hit_of_lane(&packet, lane).is_some_and(|hit| scene.surface_point(&hit, probe(lane)).shows_back())
+        hit_of_lane(&packet, lane).is_some_and(|hit| scene.interaction(&hit, probe(lane)).shows_back())
     };
     is_inside_by_share((0..PROBES).filter(|&lane| shows_back(lane)).count(), PROBES)
 }

@@ -314,7 +314,7 @@ mod tests {
     }
 
     fn surface() -> SurfacePoint {
-        SurfacePoint::white(Vec3::ZERO, Vec3::Y)
+        SurfacePoint::flat(Vec3::ZERO, Vec3::Y)
     }
 
     /// S(y) by hand: a light straight above at distance 2, one at 60° at distance 2, one below the plane.

@@ -8,7 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::sphere::mix;
-use crate::scene::SurfacePoint;
+use crate::scene::{Interaction, SurfacePoint};
 
 /// A hit that belongs to no patch, since the ray left the scene.
 const NONE: u32 = u32::MAX;
@@ -16,8 +16,8 @@ const NONE: u32 = u32::MAX;
 /// Groups of hits.
 #[derive(Default)]
 pub struct Patches {
-    /// One surface point of each patch, with the mean k_d of all.
-    pub surfaces: Vec<SurfacePoint>,
+    /// One surface point of each patch, and the mean k_d of all.
+    pub surfaces: Vec<(SurfacePoint, Vec3)>,
     /// Patch of each hit.
     of_hit: Vec<u32>,
 }
@@ -40,11 +40,11 @@ impl Patches {
     pub fn new(
         count: usize,
         size: impl Fn(&SurfacePoint) -> f32 + Sync,
-        surface: impl Fn(usize) -> Option<SurfacePoint> + Sync,
+        surface: impl Fn(usize) -> Option<Interaction> + Sync,
     ) -> Self {
         let mut order: Vec<(u64, usize)> = (0..count)
             .into_par_iter()
-            .filter_map(|hit| surface(hit).map(|surface| (key(&surface, size(&surface)), hit)))
+            .filter_map(|hit| surface(hit).map(|Interaction { point, .. }| (key(&point, size(&point)), hit)))
             .collect();
         order.par_sort_unstable();
         let groups: Vec<&[(u64, usize)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
@@ -55,7 +55,7 @@ impl Patches {
                 let diffuse = k_d.sum::<Vec3>() / members.len() as f32;
                 // The one in the middle of the list: the first ones all belong to the same mesh point.
                 let (_, middle) = members.get(members.len() / 2)?;
-                Some(SurfacePoint { diffuse, ..surface(*middle)? })
+                Some((surface(*middle)?.point, diffuse))
             })
             .collect();
         let mut of_hit = vec![NONE; count];
@@ -77,12 +77,9 @@ impl Patches {
 mod tests {
     use super::*;
 
-    fn point(x: f32, normal: Vec3, diffuse: f32) -> SurfacePoint {
-        SurfacePoint {
-            position: Vec3::new(x, 0.0, 0.0),
-            offset: 0.0,
-            geometric_normal: normal,
-            shading_normal: normal,
+    fn point(x: f32, normal: Vec3, diffuse: f32) -> Interaction {
+        Interaction {
+            point: SurfacePoint::flat(Vec3::new(x, 0.0, 0.0), normal),
             diffuse: Vec3::splat(diffuse),
             specular: Vec3::ZERO,
             emission: Vec3::ZERO,
@@ -108,7 +105,7 @@ mod tests {
         assert_eq!(patches.of(1), None);
         assert_eq!(patches.of(0), patches.of(2));
         let shared = patches.of(0).unwrap();
-        assert!((patches.surfaces[shared].diffuse.x - 0.3).abs() < 1e-6);
+        assert!((patches.surfaces[shared].1.x - 0.3).abs() < 1e-6);
         let others = [3, 4, 5].map(|hit| patches.of(hit).unwrap());
         assert!(!others.contains(&shared) && others[0] != others[1] && others[1] != others[2]);
         // Far away cells are too many to count, and nothing panics.

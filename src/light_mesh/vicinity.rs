@@ -198,7 +198,7 @@ mod tests {
         let mut random = SplitMix64::new(5);
         let surface = |_| {
             let normal = random.in_box(Vec3::NEG_ONE, Vec3::ONE).normalize_or(Vec3::Y);
-            SurfacePoint::white(shift + random.in_box(BOUNDS.min - 0.3, BOUNDS.max + 0.3), normal)
+            SurfacePoint::flat(shift + random.in_box(BOUNDS.min - 0.3, BOUNDS.max + 0.3), normal)
         };
         (0..count).map(surface).collect()
     }

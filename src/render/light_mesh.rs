@@ -8,7 +8,7 @@ use super::LightMeshes;
 use super::hybrid::shade_hybrid;
 use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
-use super::tiles::Tile;
+use super::tiles::{TILES_PER_TASK, Tile};
 use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
 use crate::accel::Accel;
 use crate::light_mesh::{MeshPoints, PointMask, Scratch};
@@ -26,8 +26,11 @@ pub(super) struct LightMeshIntegrator<'a, A> {
 
 /// The mesh points in the neighbourhoods of the paths' surface points: bricks and masks, unordered.
 fn needed_by(paths: &[TilePaths], points: &MeshPoints) -> Vec<(u64, u64)> {
-    let parts: Vec<Vec<(u64, u64)>> =
-        paths.par_iter().map(|paths| vectorize(Needed { paths, points })).collect();
+    let parts: Vec<Vec<(u64, u64)>> = paths
+        .par_iter()
+        .with_max_len(TILES_PER_TASK)
+        .map(|paths| vectorize(Needed { paths, points }))
+        .collect();
     parts.concat()
 }
 

@@ -5,16 +5,18 @@ use glam::Vec3;
 use super::camera_rays::CameraRays;
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, Hit, PacketLanes, Ray, RayHitPacket, hit_of_lane};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Interaction, Scene, SurfacePoint};
 use crate::settings::Settings;
 
-/// A surface point on a camera path, and how much of its light reaches the pixel.
+/// A surface point on a camera path, and how much of its illumination reaches the pixel.
+///
+/// A block's vertices are written once and read twice from memory: only what that needs is here.
 #[derive(Clone, Copy, Debug)]
 pub struct PathVertex {
     /// The point.
     pub surface: SurfacePoint,
-    /// Product of the k_s before it; 1 for what the camera sees directly.
-    pub weight: Vec3,
+    /// k_d times the product of the k_s before it.
+    pub reflectance: Vec3,
     /// Pixel within the tile.
     pub pixel: u32,
 }
@@ -24,8 +26,9 @@ pub struct PathVertex {
 pub struct TilePaths {
     /// Surface points; those of 16 neighbouring rays follow each other.
     pub vertices: Vec<PathVertex>,
-    /// Radiance of the background, summed over the samples of each pixel of the tile.
-    pub background: Vec<Vec3>,
+    /// Radiance, summed over the samples of each pixel of the tile: of background and emission once the paths are traced,
+    /// of everything once their vertices are shaded.
+    pub radiance: Vec<Vec3>,
     /// Camera rays traced.
     pub camera_rays: u64,
     /// Mirror reflections traced.
@@ -45,21 +48,23 @@ const WIDTH: usize = 16;
 /// How many culled back faces a ray of sight may pass: more are taken for a trap (coincident faces).
 const MAX_PASSES: u32 = 1024;
 
-/// Traces the camera paths of a tile.
+/// Traces the camera paths of a tile; what `paths` held before is gone, but its memory is used again.
 pub fn trace_paths<A: Accel>(
     accel: &A,
     scene: &Scene,
     camera: &CameraRays,
     settings: &Settings,
     tile: &Tile,
-) -> TilePaths {
+    paths: &mut TilePaths,
+) {
     let samples = settings.samples_per_pixel;
-    let mut paths = TilePaths {
-        vertices: Vec::with_capacity(tile.pixels() * samples as usize),
-        background: vec![Vec3::ZERO; tile.pixels()],
-        ..TilePaths::default()
-    };
-    let mut tracer = Tracer { accel, scene, paths: &mut paths, reflections: Vec::new(), settings };
+    paths.vertices.clear();
+    paths.vertices.reserve(tile.pixels() * samples as usize);
+    paths.radiance.clear();
+    paths.radiance.resize(tile.pixels(), Vec3::ZERO);
+    paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
+    paths.reflection_rays = 0;
+    let mut tracer = Tracer { accel, scene, paths, reflections: Vec::new(), settings };
     let mut square = Vec::with_capacity(WIDTH);
     for pixels in tile.squares() {
         square.clear();
@@ -74,7 +79,6 @@ pub fn trace_paths<A: Accel>(
         }
     }
     let mut wave = std::mem::take(&mut tracer.reflections);
-    tracer.paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
     let mut depth = 2;
     while !wave.is_empty() {
         tracer.paths.reflection_rays += wave.len() as u64;
@@ -85,7 +89,6 @@ pub fn trace_paths<A: Accel>(
         wave = std::mem::take(&mut tracer.reflections);
         depth += 1;
     }
-    paths
 }
 
 struct Tracer<'a, A> {
@@ -119,12 +122,17 @@ impl<A: Accel> Tracer<'_, A> {
     /// Takes up what a ray of sight found.
     #[inline(always)]
     fn arrive(&mut self, pending: &Pending, hit: Option<Hit>, depth: u32) {
-        let Some(surface) = self.first_visible(&pending.ray, hit) else {
-            self.paths.background[pending.pixel as usize] += pending.weight * self.scene.background;
+        let seen = self.first_visible(&pending.ray, hit);
+        let radiance = &mut self.paths.radiance[pending.pixel as usize];
+        let Some(seen) = seen else {
+            *radiance += pending.weight * self.scene.background;
             return;
         };
-        self.paths.vertices.push(PathVertex { surface, weight: pending.weight, pixel: pending.pixel });
-        let weight = pending.weight * surface.specular;
+        *radiance += pending.weight * seen.emission;
+        let surface = seen.point;
+        let reflectance = pending.weight * seen.diffuse;
+        self.paths.vertices.push(PathVertex { surface, reflectance, pixel: pending.pixel });
+        let weight = pending.weight * seen.specular;
         if weight.max_element() > self.settings.weight_threshold && depth < self.settings.max_depth {
             let direction = pending.ray.direction;
             let mirrored = direction.reflect(surface.shading_normal);
@@ -144,13 +152,14 @@ impl<A: Accel> Tracer<'_, A> {
 
     /// The first surface on a ray that is not a culled back face (spec §7).
     #[inline(always)]
-    fn first_visible(&self, ray: &Ray, mut hit: Option<Hit>) -> Option<SurfacePoint> {
+    fn first_visible(&self, ray: &Ray, mut hit: Option<Hit>) -> Option<Interaction> {
         let mut ray = *ray;
         for _ in 0..MAX_PASSES {
-            let surface = self.scene.surface_point(hit.as_ref()?, ray.direction);
-            if !surface.culled {
-                return Some(surface);
+            let seen = self.scene.interaction(hit.as_ref()?, ray.direction);
+            if !seen.culled {
+                return Some(seen);
             }
+            let surface = seen.point;
             // On behind the surface, which is the far side of the normal that faces the viewer.
             ray.origin = surface.position - surface.geometric_normal * surface.offset;
             hit = self.accel.intersect(&ray);

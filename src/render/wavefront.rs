@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use super::camera_rays::CameraRays;
 use super::paths::{PathVertex, TilePaths, trace_paths};
 use super::stats::{RenderStats, add_since};
-use super::tiles::{Tile, blocks};
+use super::tiles::{TILE, TILES_PER_TASK, Tile, blocks};
 use super::{Film, Progress};
 use crate::accel::Accel;
 use crate::light_mesh::PointMask;
-use crate::scene::{Camera, Scene, SurfacePoint};
+use crate::scene::{Camera, Scene};
 use crate::settings::Settings;
 
 /// What differs between the integrators: how the surface points of a block get their light.
@@ -45,7 +45,7 @@ pub(super) struct ShadeCounters {
     pub indirect_fallbacks: u64,
 }
 
-/// Pixels per block: enough to keep all threads busy and packets full, at some 100 bytes of path each.
+/// Pixels per block: enough to keep all threads busy and packets full, at some 70 bytes of path each.
 const BLOCK_PIXELS: u64 = 1 << 20;
 
 /// Renders with an integrator.
@@ -64,27 +64,28 @@ pub(super) fn wavefront<A: Accel, I: BlockIntegrator>(
     let camera = CameraRays::new(camera, settings.resolution, settings.samples_per_pixel);
     let block_pixels = settings.block_pixels.unwrap_or(BLOCK_PIXELS) / u64::from(settings.samples_per_pixel);
     let blocks = blocks(settings.resolution, block_pixels);
-    let trace_block = |block: &[Tile], stats: &mut RenderStats| -> Vec<TilePaths> {
+    let trace_block = |block: &[Tile], paths: &mut Vec<TilePaths>, stats: &mut RenderStats| {
         let start = Instant::now();
-        let paths = block.par_iter().map(|tile| trace_paths(accel, scene, &camera, settings, tile)).collect();
+        paths.resize_with(block.len(), TilePaths::default);
+        block
+            .par_iter()
+            .zip(&mut *paths)
+            .with_max_len(TILES_PER_TASK)
+            .for_each(|(tile, paths)| trace_paths(accel, scene, &camera, settings, tile, paths));
         add_since(&mut stats.seconds.paths, start);
-        paths
     };
+    // Kept from block to block: the first use of memory costs a sixth of the camera paths.
+    let mut paths: Vec<TilePaths> = Vec::new();
 
     // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
-    let mut only_block = None;
-    let mut needed = Vec::new();
-    for block in &blocks {
-        if !integrator.wants_whole_image() {
-            break;
-        }
-        let paths = trace_block(block, &mut stats);
-        needed.extend(integrator.needed_for_whole_image(&paths));
-        if blocks.len() == 1 {
-            only_block = Some(paths);
-        }
-    }
+    let mut traced = false;
     if integrator.wants_whole_image() {
+        let mut needed = Vec::new();
+        for block in &blocks {
+            trace_block(block, &mut paths, &mut stats);
+            needed.extend(integrator.needed_for_whole_image(&paths));
+        }
+        traced = blocks.len() == 1;
         let start = Instant::now();
         integrator.prepare_whole_image(PointMask::union(needed), &mut stats);
         add_since(&mut stats.seconds.mesh, start);
@@ -92,7 +93,9 @@ pub(super) fn wavefront<A: Accel, I: BlockIntegrator>(
 
     let mut done = 0;
     for block in &blocks {
-        let paths = only_block.take().unwrap_or_else(|| trace_block(block, &mut stats));
+        if !traced {
+            trace_block(block, &mut paths, &mut stats);
+        }
         for tile in &paths {
             stats.rays.camera += tile.camera_rays;
             stats.rays.reflection += tile.reflection_rays;
@@ -103,47 +106,54 @@ pub(super) fn wavefront<A: Accel, I: BlockIntegrator>(
         add_since(&mut stats.seconds.mesh, start);
 
         let start = Instant::now();
-        let shaded: Vec<(Vec<Vec3>, ShadeCounters)> = block
+        let counters: Vec<ShadeCounters> = block
             .par_iter()
-            .zip(&paths)
-            .map(|(tile, paths)| shade_tile(integrator, tile, paths, settings.samples_per_pixel))
+            .zip(&mut paths)
+            .with_max_len(TILES_PER_TASK)
+            .map(|(tile, paths)| shade_tile(integrator, tile, paths))
             .collect();
-        for (tile, (pixels, counters)) in block.iter().zip(&shaded) {
-            for (row, values) in (tile.y..).zip(pixels.chunks(tile.width as usize)) {
-                let at = row as usize * width as usize + tile.x as usize;
-                for (pixel, value) in film.pixels[at..].iter_mut().zip(values) {
-                    *pixel = value.to_array();
-                }
-            }
+        for counters in counters {
             stats.rays.shadow += counters.shadow_rays;
             stats.mesh_points.direct.nearest_fallback += counters.direct_fallbacks;
             stats.mesh_points.indirect.nearest_fallback += counters.indirect_fallbacks;
-            done += tile.pixels() as u64;
         }
+        expose(block, &paths, settings.samples_per_pixel, &mut film);
         add_since(&mut stats.seconds.shade, start);
+        done += block.iter().map(|tile| tile.pixels() as u64).sum::<u64>();
         progress.pixels(done, total);
     }
     (film, stats)
 }
 
-/// Radiance of a tile's pixels: eqs. (6) and (8), the sum over each path of weight · (Emiss + k_d · I).
-fn shade_tile<I: BlockIntegrator>(
-    integrator: &I,
-    tile: &Tile,
-    paths: &TilePaths,
-    samples: u32,
-) -> (Vec<Vec3>, ShadeCounters) {
-    let mut pixels = paths.background.clone();
-    debug_assert_eq!(pixels.len(), tile.pixels());
+/// Adds the light that the vertices of a tile send towards the camera: eqs. (6) and (8), the sum over each path of
+/// weight · (Emiss + k_d · I), whose first part is there already.
+fn shade_tile<I: BlockIntegrator>(integrator: &I, tile: &Tile, paths: &mut TilePaths) -> ShadeCounters {
     let mut light = vec![Vec3::ZERO; paths.vertices.len()];
     let counters = integrator.shade(tile, &paths.vertices, &mut light);
     for (vertex, light) in paths.vertices.iter().zip(light) {
-        let SurfacePoint { emission, diffuse, .. } = vertex.surface;
-        pixels[vertex.pixel as usize] += vertex.weight * (emission + diffuse * light);
+        paths.radiance[vertex.pixel as usize] += vertex.reflectance * light;
     }
+    counters
+}
+
+/// Puts the pixels of a block on the film: means over their samples.
+fn expose(block: &[Tile], paths: &[TilePaths], samples: u32, film: &mut Film) {
+    let width = film.resolution.0 as usize;
     let scale = 1.0 / samples as f32;
-    pixels.iter_mut().for_each(|pixel| *pixel *= scale);
-    (pixels, counters)
+    // Rows of tiles lie one after the other on the film, and in the block.
+    let rows_of_tiles = film.pixels.par_chunks_mut(width * TILE as usize).enumerate();
+    rows_of_tiles.with_max_len(1).for_each(|(row, pixels)| {
+        let top = row as u32 * TILE;
+        let members = block.partition_point(|tile| tile.y < top)..block.partition_point(|tile| tile.y <= top);
+        for (tile, paths) in block[members.clone()].iter().zip(&paths[members]) {
+            let lines = pixels.chunks_mut(width).zip(paths.radiance.chunks(tile.width as usize));
+            for (line, values) in lines {
+                for (pixel, value) in line[tile.x as usize..].iter_mut().zip(values) {
+                    *pixel = (*value * scale).to_array();
+                }
+            }
+        }
+    });
 }
 
 /// What I(y) is multiplied by before k_d: 1, or 1/π for Lambertian reflectors (spec §12).

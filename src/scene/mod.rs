@@ -20,7 +20,7 @@ pub use camera::Camera;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
-pub use surface::SurfacePoint;
+pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
 
 /// Everything that is rendered, in world space of any unit of length.

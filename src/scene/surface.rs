@@ -1,11 +1,11 @@
-//! Surface points: what a ray found, with everything that shading needs.
+//! Surface points, and what a ray finds out about them.
 
 use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
 use super::{Scene, TextureMap};
 use crate::accel::Hit;
 
-/// A visible surface point y (spec §1) with its material evaluated.
+/// A visible surface point y (spec §1).
 ///
 /// Both normals are unit length and face the side from which the point was seen (spec §7).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +19,15 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Interpolated vertex normal, or the geometric one; it turns the cosines only.
     pub shading_normal: Vec3,
+}
+
+/// What a ray found: a surface point and its material there.
+///
+/// Apart from the point, since an image's worth of points is kept for their light, and of the material only a product.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interaction {
+    /// y.
+    pub point: SurfacePoint,
     /// k_d.
     pub diffuse: Vec3,
     /// k_s.
@@ -34,20 +43,9 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// The front of a white surface without a mirror or light of its own; rays leave it from 10⁻⁵ above.
-    pub fn white(position: Vec3, normal: Vec3) -> Self {
-        Self {
-            position,
-            offset: 1e-5,
-            geometric_normal: normal,
-            shading_normal: normal,
-            diffuse: Vec3::ONE,
-            specular: Vec3::ZERO,
-            emission: Vec3::ZERO,
-            front: true,
-            two_sided: false,
-            culled: false,
-        }
+    /// A point of a flat surface near the origin: rays leave it from 10⁻⁵ above.
+    pub fn flat(position: Vec3, normal: Vec3) -> Self {
+        Self { position, offset: 1e-5, geometric_normal: normal, shading_normal: normal }
     }
 
     /// Start of rays that leave the point on the side from which it was seen.
@@ -55,7 +53,9 @@ impl SurfacePoint {
     pub fn ray_origin(&self) -> Vec3 {
         self.position + self.geometric_normal * self.offset
     }
+}
 
+impl Interaction {
     /// Whether it is the back of a one-sided surface.
     pub fn shows_back(&self) -> bool {
         !self.front && !self.two_sided
@@ -68,8 +68,8 @@ impl SurfacePoint {
 const OFFSET_FACTOR: f32 = 32.0 * f32::EPSILON;
 
 impl Scene {
-    /// The surface point of a hit, seen along `direction` (any length).
-    pub fn surface_point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
+    /// Surface point and material of a hit, seen along `direction` (any length).
+    pub fn interaction(&self, hit: &Hit, direction: Vec3) -> Interaction {
         let instance = &self.instances[hit.instance as usize];
         let mesh = &*self.meshes[instance.mesh as usize];
         let corners = mesh.corners(hit.triangle);
@@ -130,11 +130,9 @@ impl Scene {
                 mesh.triangles[hit.triangle as usize].map(|i| Vec3::from_array(colors[i as usize]));
             diffuse *= a * w + b * u + c * v;
         }
-        SurfacePoint {
-            position,
-            offset: OFFSET_FACTOR * (position.abs().max_element() + extent),
-            geometric_normal,
-            shading_normal,
+        let offset = OFFSET_FACTOR * (position.abs().max_element() + extent);
+        Interaction {
+            point: SurfacePoint { position, offset, geometric_normal, shading_normal },
             diffuse,
             specular: material.specular,
             emission,
@@ -187,14 +185,14 @@ mod tests {
     #[test]
     fn the_front_is_the_counter_clockwise_side() {
         let scene = triangle(None);
-        let front = scene.surface_point(&HIT, Vec3::NEG_Z);
+        let front = scene.interaction(&HIT, Vec3::NEG_Z);
         assert!(front.front);
-        assert_eq!(front.geometric_normal, Vec3::Z);
+        assert_eq!(front.point.geometric_normal, Vec3::Z);
         assert_eq!(front.emission, Vec3::ONE);
-        assert_eq!(front.position, Vec3::new(0.25, 0.5, 0.0));
-        let back = scene.surface_point(&HIT, Vec3::Z);
+        assert_eq!(front.point.position, Vec3::new(0.25, 0.5, 0.0));
+        let back = scene.interaction(&HIT, Vec3::Z);
         assert!(!back.front);
-        assert_eq!(back.geometric_normal, Vec3::NEG_Z);
+        assert_eq!(back.point.geometric_normal, Vec3::NEG_Z);
         assert_eq!(back.emission, Vec3::ZERO);
     }
 
@@ -203,9 +201,9 @@ mod tests {
     fn mirroring_carries_the_front_along() {
         let mirror = triangle(Some(Affine3A::from_scale(Vec3::new(1.0, 1.0, -1.0))));
         // The front pointed to +z; its mirror image points to −z.
-        assert!(mirror.surface_point(&HIT, Vec3::Z).front);
+        assert!(mirror.interaction(&HIT, Vec3::Z).front);
         let flipped_x = triangle(Some(Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0))));
         // Mirrored in x, the image of the +z normal is still +z.
-        assert!(flipped_x.surface_point(&HIT, Vec3::NEG_Z).front);
+        assert!(flipped_x.interaction(&HIT, Vec3::NEG_Z).front);
     }
 }

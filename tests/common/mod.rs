@@ -119,9 +119,9 @@ pub fn conventional(scene: &Scene, camera: &Camera, settings: &Settings) -> (Fil
     picture(scene, camera, &Settings { integrator: Integrator::Conventional, ..settings.clone() })
 }
 
-/// A surface point of white material in free space.
+/// A surface point in free space.
 pub fn surface_point(position: Vec3, normal: Vec3) -> SurfacePoint {
-    SurfacePoint::white(position, normal)
+    SurfacePoint::flat(position, normal)
 }
 
 /// I(y) at surface points, which need not lie on any geometry.
