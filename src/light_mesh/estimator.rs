@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::direct::{Basis, DirectValues};
 use super::directional;
 use super::leaks::{amounts_differ, is_inside, keep_visible, lights_differ};
-use super::lights::{LANES, Lanes, LightTable, VisibilityBits, horizontal_sum};
+use super::lights::{LANES, Lanes, LightTable, VisibilityBits, horizontal_extremes, horizontal_sums};
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::store::{PointMask, UNKNOWN};
@@ -194,13 +194,11 @@ impl DirectMesh {
                 most[lane] = if high > most[lane] { high } else { most[lane] };
             }
         }
-        let [r, g, b, total] = sums.map(|sum| horizontal_sum(&sum));
-        let differ = self.points.leaks() == Leaks::Visibility && {
-            let least = least.iter().copied().fold(f32::INFINITY, f32::min);
-            let most = most.iter().copied().fold(0.0, f32::max);
-            amounts_differ([least, most].into_iter())
-        };
-        (total > 0.0 && !differ).then(|| Vec3::new(r, g, b).max(Vec3::ZERO) / total)
+        let [r, g, b, weights] = &sums;
+        let sums = horizontal_sums([r, g, b, weights]);
+        let differ = self.points.leaks() == Leaks::Visibility
+            && amounts_differ(horizontal_extremes(&least, &most).into_iter());
+        (sums.w > 0.0 && !differ).then(|| sums.truncate().max(Vec3::ZERO) / sums.w)
     }
 
     /// Notes what the points of a group give to a normal.
