@@ -13,6 +13,7 @@ mod rays;
 mod report;
 mod scaling;
 mod setup;
+mod shading;
 mod threads;
 mod timing;
 

@@ -6,7 +6,7 @@ use super::configuration::{Configuration, conventional, estimator_name};
 use super::report::{Aim, Goal, Plot, Report, Series, Table};
 use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, TemporaryFolder, forest, new_report};
 use super::timing::timed;
-use super::{BenchError, BenchOptions, threads};
+use super::{BenchError, BenchOptions, shading, threads};
 use crate::accel::Backend;
 use crate::scene::generate::forest::Forest;
 use crate::settings::{Estimator, PointLayout, Settings};
@@ -91,15 +91,11 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
         let backend = Backend::build(options.backend, &setup.scene)?.backend;
         axis.measure(f64::from(lights), &setup, &backend, sizes.side, 0.5, options, &mut report)?;
     }
-    if let (Some(few), Some(many)) = (axis.directional_shading.first(), axis.directional_shading.last()) {
-        let name = format!(
-            "directional shading, {} lights over {}",
-            sizes.lights.last().unwrap_or(&0),
-            sizes.lights.first().unwrap_or(&0)
-        );
-        report.goals.push(Goal::new(name, many / few, Aim::AtMost, 1.2));
-    }
     axis.finish(&mut report);
+    if let [few, .., many] = *sizes.lights {
+        let configuration = &configurations(0.5)[0];
+        shading::measure(triangles, [few, many], configuration, sizes.side, options, &mut report)?;
+    }
 
     log("triangles");
     let mut axis = Axis::new("triangles", "triangles");
@@ -122,8 +118,6 @@ struct Axis {
     name: &'static str,
     table: Table,
     plot: Plot,
-    /// Shading seconds of the `directional` mesh.
-    directional_shading: Vec<f64>,
 }
 
 impl Axis {
@@ -140,7 +134,6 @@ impl Axis {
                 y: "seconds".to_owned(),
                 series: Vec::new(),
             },
-            directional_shading: Vec::new(),
         }
     }
 
@@ -179,9 +172,6 @@ impl Axis {
                 record("mesh", &|frame| frame.stats.seconds.mesh),
                 record("shade", &|frame| frame.stats.seconds.shade),
             ];
-            if *name == estimator_name(Estimator::Directional) {
-                self.directional_shading.push(stages[2]);
-            }
             let mut row = vec![value.to_string(), (*name).to_owned(), format!("{frame:.4}")];
             row.extend(stages.iter().map(|seconds| format!("{seconds:.4}")));
             row.push(frames[0].stats.mesh_points.direct.evaluated.to_string());

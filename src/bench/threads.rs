@@ -9,7 +9,7 @@ use super::BenchOptions;
 use super::configuration::{Configuration, conventional};
 use super::report::{Aim, Goal, Report, Table};
 use super::setup::Setup;
-use super::timing::{Budget, Samples, timed};
+use super::timing::{Samples, timed};
 use crate::accel::Backend;
 use crate::render::StageSeconds;
 
@@ -17,9 +17,6 @@ use crate::render::StageSeconds;
 const SHARE: f64 = 0.05;
 /// What two threads are to reach.
 const GOAL: f64 = 1.8;
-
-/// How many times as often as others those measurements are repeated that take a tenth of a second.
-const SHORT: usize = 5;
 
 const THREADS: [&str; 2] = ["1 thread", "2 threads"];
 
@@ -73,9 +70,8 @@ pub fn measure(
     let mut table =
         Table::new(format!("Threads, {side}×{side}"), &["stage", "1 thread", "2 threads", "times faster"]);
     let budget = options.budget();
-    let often = Budget { repetitions: SHORT * budget.repetitions, ..budget };
     for (name, settings, budget) in [
-        ("light-mesh", configuration.settings(&setup.settings, (side, side)), often),
+        ("light-mesh", configuration.settings(&setup.settings, (side, side)), budget.often()),
         ("conventional", conventional(&setup.settings, (side, side)), budget),
     ] {
         let runs = budget.alternate(2, |variant| {
