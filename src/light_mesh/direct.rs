@@ -8,7 +8,8 @@ use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 use super::directional::{self, COEFFICIENTS};
-use super::lights::{LANES, Lanes, LightTable, SeenFromPoint, VisibilityBits, expand_bits, horizontal_sum};
+use super::lanes::{LANES, Lanes, VisibilityBits, expand_bits, horizontal_sum};
+use super::lights::{LightTable, SeenFromPoint};
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::settings::Estimator;
 use crate::simd::vectorize;

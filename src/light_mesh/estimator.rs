@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::direct::{Basis, DirectValues};
 use super::directional;
+use super::lanes::{LANES, Lanes, VisibilityBits, horizontal_extremes, horizontal_sums};
 use super::leaks::{amounts_differ, is_inside, keep_visible, lights_differ};
-use super::lights::{LANES, Lanes, LightTable, VisibilityBits, horizontal_extremes, horizontal_sums};
+use super::lights::LightTable;
 use super::neighbours::Neighbours;
 use super::points::{MeshError, MeshPoints};
 use super::store::{PointMask, UNKNOWN};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::lights::{LANES, VisibilityBits};
+use super::lanes::{LANES, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::MeshPoints;
 use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::lights::{LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::vicinity::Group;
 
 /// Share of R over which smooth weights rise from 0 at the plane of the hemisphere: without it points would enter and

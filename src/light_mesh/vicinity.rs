@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::{IVec3, Vec3};
 
-use super::lights::{LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 use super::neighbours::Ball;
 use super::store::UNKNOWN;
 
