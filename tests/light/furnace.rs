@@ -1,11 +1,10 @@
 //! A closed white furnace settles at e/(1 − ρ) everywhere (spec §5).
 
-mod common;
-
-use common::{Builder, camera, picture};
 use glam::Vec3;
 use lightmesh::scene::{Falloff, Material};
 use lightmesh::settings::{IndirectForm, IndirectSettings, Normalization, Settings, Spacing};
+
+use crate::common::{Builder, camera, picture};
 
 /// The pixels of a picture inside of a closed box whose walls all emit `emission` and reflect `albedo`.
 fn furnace(emission: f32, albedo: f32, indirect: IndirectSettings) -> Vec<[f32; 3]> {

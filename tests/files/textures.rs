@@ -1,18 +1,17 @@
 //! Pictures on surfaces stand the right way up, whatever the format, and where they are cut out, sight and light pass.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use common::{camera, conventional, light};
 use glam::Vec3;
 use lightmesh::scene::load::load_model;
 use lightmesh::scene::{Falloff, Scene};
 use lightmesh::settings::Settings;
+
+use crate::common::{camera, conventional, light};
 
 /// Upper left red, upper right green; lower left blue, lower right nothing.
 const TEXELS: [[u8; 4]; 4] = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 0]];

@@ -1,15 +1,14 @@
 //! Instances are an economy of memory, not a different scene.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Builder, camera, grey, light};
 use glam::{Affine3A, Mat3, Vec3};
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::render::{Film, render};
 use lightmesh::scene::{Falloff, Instance, Positions, Scene, TriangleMesh};
 use lightmesh::settings::{Integrator, Resolve, Settings, Spacing};
+
+use crate::common::{Builder, camera, grey, light};
 
 /// Placements that are exact in single precision: a turn, a mirror image, scales of both kinds, and all at once.
 fn placements() -> Vec<Affine3A> {

@@ -1,7 +1,5 @@
 //! The gallery's list, its scenes and its committed pictures fit together.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,14 +1,13 @@
 //! Hybrid shadows are the conventional tracer's for a fraction of its rays (spec §4).
 
-mod common;
-
-use common::{camera, conventional, forest, grey, light, picture};
 use glam::Vec3;
 use lightmesh::render::Film;
 use lightmesh::scene::Falloff;
 use lightmesh::scene::generate::interior::Interior;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
 use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Settings, Spacing};
+
+use crate::common::{camera, conventional, forest, grey, light, picture};
 
 fn interior() -> LoadedScene {
     let folder = tempfile::tempdir().unwrap();
@@ -51,7 +50,7 @@ fn in_the_interior_four_fifths_of_the_shadow_rays_are_saved() {
 /// what the mesh points missed, and what they find spreads along the shadow.
 #[test]
 fn occluders_thinner_than_the_spacing_keep_their_shadows() {
-    let mut builder = common::Builder::default();
+    let mut builder = crate::common::Builder::default();
     builder.quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0, 0);
     // A wire above the floor, 0.06 wide where mesh points are 0.5 apart; its shadow lies before it.
     builder.quad(Vec3::new(-2.0, 0.15, -0.03), Vec3::Z * 0.06, Vec3::X * 4.0, 0);

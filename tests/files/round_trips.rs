@@ -1,12 +1,11 @@
 //! What is written in any of the formats is read back as it was: random small models, vertex by vertex.
 
-mod common;
-
 use std::path::Path;
 
-use common::soup::Soup;
 use lightmesh::scene::load::{Model, gltf, obj, ply};
 use proptest::prelude::*;
+
+use crate::common::soup::Soup;
 
 fn area_is_positive(soup: &[[f32; 3]], [a, b, c]: [u32; 3]) -> bool {
     let at = |i: u32| glam::DVec3::from_array(soup[i as usize].map(f64::from));

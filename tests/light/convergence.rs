@@ -1,11 +1,10 @@
 //! `per-light` converges to the conventional picture as R and the spacing go to 0 (spec §13).
 
-mod common;
-
-use common::{Builder, camera, conventional, forest, grey, light, picture, relative_rmse};
 use glam::Vec3;
 use lightmesh::scene::Falloff;
 use lightmesh::settings::{Neighbourhood, Radius, Settings, Spacing};
+
+use crate::common::{Builder, camera, conventional, forest, grey, light, picture, relative_rmse};
 
 /// RMSE against the conventional picture over its mean, for R and a spacing of R/`density`, halved `steps` times.
 fn errors(

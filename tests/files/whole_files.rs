@@ -1,7 +1,5 @@
 //! Outputs appear whole or not at all, and what cannot be written is known before rendering starts.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,13 +1,12 @@
 //! A picture depends on nothing but scene and settings: not on threads, blocks or timing, to the last bit.
 
-mod common;
-
-use common::{bits, forest, picture};
 use glam::Vec3;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::settings::{
     Estimator, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
 };
+
+use crate::common::{bits, forest, picture};
 
 fn scene() -> LoadedScene {
     let mut loaded = forest(3_000, 20);

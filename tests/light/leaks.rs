@@ -1,13 +1,12 @@
 //! No light through walls: a dark room beside a bright one stays dark (spec §3, §8).
 
-mod common;
-
-use common::{Builder, camera, grey, light, mean, picture};
 use glam::Vec3;
 use lightmesh::scene::{Camera, Falloff, Scene};
 use lightmesh::settings::{
     Estimator, IndirectForm, IndirectSettings, Leaks, PointSettings, Settings, Spacing,
 };
+
+use crate::common::{Builder, camera, grey, light, mean, picture};
 
 /// Spacing of the mesh points; the wall between the rooms is a quarter of it thick.
 const SPACING: f32 = 0.4;

@@ -1,15 +1,14 @@
 //! Coordinates far from the origin, and details in huge scenes: no acne, no gaps.
 
-mod common;
-
 use std::ops::Range;
 
-use common::{Builder, camera, grey, light};
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::render::{Film, render};
 use lightmesh::scene::{Camera, Falloff, Scene};
 use lightmesh::settings::{Integrator, Resolve, Settings, Spacing};
+
+use crate::common::{Builder, camera, grey, light};
 
 const RESOLUTION: (u32, u32) = (96, 72);
 

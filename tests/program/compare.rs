@@ -1,7 +1,5 @@
 //! `compare` says how far two pictures are apart, in numbers that scripts can rely on.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
 use std::path::{Path, PathBuf};
 
 use clap::Parser;

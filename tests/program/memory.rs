@@ -1,9 +1,5 @@
 //! Memory is told before it is taken.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
-mod common;
-
 use std::process::Command;
 
 use lightmesh::accel::{Accel, Backend, BackendChoice, Footprint, MemoryEstimate};
@@ -14,7 +10,7 @@ use lightmesh::with_accel;
 /// 100,000 triangles, which is large enough that fixed costs don't count.
 #[test]
 fn estimates_are_near_what_the_structures_take() {
-    let scene = common::forest(100_000, 10).scene;
+    let scene = crate::common::forest(100_000, 10).scene;
     let estimate = MemoryEstimate::of(&scene);
     for (choice, Footprint { built, building }) in
         [(BackendChoice::Embree, estimate.embree), (BackendChoice::Bvh, estimate.bvh)]

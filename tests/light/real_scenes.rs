@@ -2,12 +2,9 @@
 //!
 //! Needs the folder of test scenes beside the project.
 
-mod common;
-
 use std::f32::consts::PI;
 use std::path::Path;
 
-use common::{backend, conventional, picture};
 use glam::Vec3;
 use lightmesh::accel::{Accel, Backend, Ray};
 use lightmesh::light_mesh::{DirectMesh, Neighbours};
@@ -16,6 +13,8 @@ use lightmesh::scene::load::{LoadedScene, auto_exposure, open_scene};
 use lightmesh::scene::{Interaction, PointLight, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 use lightmesh::with_accel;
+
+use crate::common::{backend, conventional, picture};
 
 const RESOLUTION: (u32, u32) = (96, 72);
 

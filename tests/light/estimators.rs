@@ -1,19 +1,18 @@
 //! The estimators compute the formulas that they are named after: eqs. (1), (2), (3) and spec §4, on numbers worked
 //! out by hand.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{
-    Builder, conventional, direct_illumination, forest, grey, light, mean, picture, relative_rmse,
-    surface_point,
-};
 use glam::Vec3;
 use lightmesh::scene::{Falloff, Scene};
 use lightmesh::settings::{
     Estimator, Leaks, LightMeshSettings, Neighbourhood, PointLayout, PointSettings, Radius, Resolve,
     Settings, Spacing,
+};
+
+use crate::common::{
+    Builder, conventional, direct_illumination, forest, grey, light, mean, picture, relative_rmse,
+    surface_point,
 };
 
 const ALL: [Estimator; 4] = [Estimator::Paper, Estimator::Ratio, Estimator::PerLight, Estimator::Directional];

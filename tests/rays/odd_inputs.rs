@@ -1,11 +1,6 @@
 //! All backends give the same answers to inputs that no one means to give them: damaged geometry, placements that
 //! can hardly be undone, numbers without bounds.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
-#[path = "common/triangles.rs"]
-mod triangles;
-
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
@@ -17,7 +12,8 @@ use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::scene::random::SplitMix64;
 use lightmesh::scene::{CutOut, Scene, TriangleMesh};
 use lightmesh::with_accel;
-use triangles::{Random, mesh, scene, soup};
+
+use crate::common::triangles::{Random, mesh, scene, soup};
 
 /// A right triangle at z = 0 with legs of length `size` along x and y.
 fn corner(size: f32) -> Arc<TriangleMesh> {

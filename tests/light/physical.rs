@@ -3,12 +3,9 @@
 //! The pictures are not part of this repository: they are looked for in `../shared/references`, or where
 //! `LIGHTMESH_REFERENCES` points to.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use common::{backend, picture};
 use glam::Vec3;
 use lightmesh::accel::Accel;
 use lightmesh::image::metrics::{self, MetricsOptions};
@@ -19,6 +16,8 @@ use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::settings::Settings;
 use lightmesh::with_accel;
 use serde_json::Value;
+
+use crate::common::{backend, picture};
 
 fn references() -> Option<PathBuf> {
     let folder = std::env::var_os("LIGHTMESH_REFERENCES")

@@ -1,13 +1,12 @@
 //! The penumbra of `sphere` is the one that analysis gives (spec §13).
 
-mod common;
-
-use common::{Builder, direct_illumination, grey, light, surface_point};
 use glam::{Quat, Vec3};
 use lightmesh::scene::Falloff;
 use lightmesh::settings::{
     Estimator, Leaks, LightMeshSettings, Neighbourhood, PointSettings, Radius, Spacing,
 };
+
+use crate::common::{Builder, direct_illumination, grey, light, surface_point};
 
 /// R; all other lengths follow.
 const RADIUS: f32 = 1.0;

@@ -4,9 +4,6 @@
 //! Hits are compared to the last bit: the reference does the same arithmetic without boxes, trees and SIMD, so
 //! that any difference is a hit that a box culled, a lane mixed up or a tie broken otherwise.
 
-#[path = "common/triangles.rs"]
-mod triangles;
-
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
@@ -16,7 +13,8 @@ use lightmesh::accel::{
     hit_of_lane,
 };
 use lightmesh::scene::{CutOut, Scene, TriangleMesh};
-use triangles::{Random, mesh, scene};
+
+use crate::common::triangles::{self, Random, mesh, scene};
 
 fn single(mesh: Arc<TriangleMesh>) -> Scene {
     scene(vec![mesh], vec![(0, None)])

@@ -1,7 +1,5 @@
 //! Damaged and hostile picture files end in an error: no panic, no endless loop, no huge allocation.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{Blocks, Compression, Vec2, WritableImage};

@@ -1,9 +1,5 @@
 //! The `embree` backend gives the hits of the brute-force reference, for single rays and for packets of every
 //! width, on every kind of scene. Both versions of Embree must pass; `tests/debian13.sh` runs the other one.
-#![cfg(feature = "embree")]
-
-#[path = "common/triangles.rs"]
-mod triangles;
 
 use std::{io::Write, sync::Arc};
 
@@ -17,7 +13,8 @@ use lightmesh::{
     crosscheck::{Judge, Subject, check_rays},
     scene::{CutOut, Scene, TriangleMesh},
 };
-use triangles::{Random, mesh, scene, soup};
+
+use crate::common::triangles::{Random, mesh, scene, soup};
 
 /// The backend over a scene. Without Embree the test is skipped, aloud; where `REQUIRE_EMBREE` is set it fails,
 /// as it does where that names another major version.

@@ -1,7 +1,5 @@
 //! Pictures survive the way to disk and back, and files of others are read for what they mean.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
 use exr::image::{AnyChannel as Channel, write::layers::WritableLayers};
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::LayerAttributes;

@@ -1,11 +1,8 @@
 //! A mesh point is evaluated at most once in its life, and only if a surface point asks for it (spec §9).
 
-mod common;
-
 use std::collections::HashMap;
 use std::sync::Mutex;
 
-use common::{backend, bits, camera, forest, surface_point};
 use glam::Vec3;
 use lightmesh::accel::{Accel, BvhAccel, Coherence, Hit, LaneMask, Ray, RayHitPacket, RayPacket};
 use lightmesh::light_mesh::{DirectMesh, IndirectMesh, MeshPoints, NeededPoints, Neighbours, PointMask};
@@ -13,6 +10,8 @@ use lightmesh::render::{LightMeshes, render_light_mesh};
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::scene::{Camera, SurfacePoint};
 use lightmesh::settings::{IndirectSettings, Leaks, Settings, Spacing};
+
+use crate::common::{backend, bits, camera, forest, surface_point};
 
 /// Ray queries that keep account of all occlusion rays: how often each was asked.
 struct Witness {

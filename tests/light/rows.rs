@@ -1,13 +1,12 @@
 //! The short cut for surface points in a row of the same normal gives what the plain way of shading gives.
 
-mod common;
-
-use common::{forest, surface_point};
 use glam::Vec3;
 use lightmesh::accel::BvhAccel;
 use lightmesh::light_mesh::{DirectMesh, PointMask, Scratch};
 use lightmesh::scene::SurfacePoint;
 use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, Neighbourhood, Spacing};
+
+use crate::common::{forest, surface_point};
 
 /// Rows of surface points: on the ground, and across the crowns at any slope.
 fn rows() -> Vec<SurfacePoint> {

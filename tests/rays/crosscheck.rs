@@ -1,11 +1,6 @@
 //! The cross-check tells rays that ray tracers may disagree about from rays that one of them gets wrong, and misses
 //! no wrong one.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
-
-#[path = "common/triangles.rs"]
-mod triangles;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,7 +12,8 @@ use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
 use lightmesh::scene::{CutOut, Scene};
-use triangles::{mesh, scene};
+
+use crate::common::triangles::{mesh, scene};
 
 /// A square of two triangles at z = 0, from (0, 0) to (1, 1), whose diagonal runs from (0, 0) to (1, 1).
 fn square(cutout: Option<CutOut>) -> Scene {

@@ -1,14 +1,13 @@
 //! A model without a camera is seen where there is something to see: rooms from inside, things from outside.
 
-mod common;
-
-use common::{Builder, grey};
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::complete_view;
 use lightmesh::scene::load::{LoadedScene, OpenedScene, Skipped};
 use lightmesh::scene::{Falloff, LightShape, Material, Scene};
 use lightmesh::settings::Settings;
+
+use crate::common::{Builder, grey};
 
 /// Chooses camera and lights.
 fn viewed(builder: Builder, choice: BackendChoice) -> LoadedScene {

@@ -1,17 +1,16 @@
 //! A picture does not depend on the format that its model came in.
 
-mod common;
-
 use std::fs;
 
-use common::bits;
-use common::soup::Soup;
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::complete_view;
 use lightmesh::render::{Film, render};
 use lightmesh::scene::load::open_scene;
 use lightmesh::scene::random::SplitMix64;
+
+use crate::common::bits;
+use crate::common::soup::Soup;
 
 /// Hilly ground with two hundred random triangles above it; coordinates with all the digits that single precision has.
 fn model() -> Soup {
