@@ -1,5 +1,6 @@
 //! The scene: what is rendered. Immutable once loaded.
 
+mod alpha_mask;
 mod bounds;
 mod camera;
 pub mod generate;
@@ -15,16 +16,17 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
 pub use bounds::Bounds;
 pub use camera::Camera;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
-pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
 
 /// Everything that is rendered, in world space of any unit of length.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// Unique geometry.
     pub meshes: Vec<Arc<TriangleMesh>>,

@@ -5,7 +5,6 @@
 
 mod bare;
 mod compact;
-mod cutout;
 mod error;
 pub mod gltf;
 pub mod mtl;

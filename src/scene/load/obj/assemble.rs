@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use super::chunk::NameKind;
 use super::materials::MaterialTable;
 use super::statements::{ABSENT, Statements};
-use crate::scene::load::cutout::cut_out;
 use crate::scene::load::triangulate::{Triangulator, has_no_area};
 use crate::scene::load::{LoadError, Model, Part, Warning};
 use crate::scene::{Instance, Positions, TriangleMaterials, TriangleMesh};
@@ -51,9 +50,8 @@ pub fn assemble(
         return Err(LoadError::Empty { file: path.to_owned(), skipped });
     }
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut mesh = builder.finish(name);
-    let (materials, masks, more) = table.into_used();
-    cut_out(&mut mesh, &masks);
+    let mesh = builder.finish(name);
+    let (materials, more) = table.into_used();
     warnings.extend(more);
     let instances = vec![Instance { mesh: 0, to_world: None }];
     Ok(Model { meshes: vec![mesh], instances, materials, parts, skipped, warnings, ..Model::default() })
@@ -348,6 +346,6 @@ impl<'a> MeshBuilder<'a> {
         };
         let positions = Positions::new(positions);
         let triangles = Arc::new(self.triangles);
-        TriangleMesh { name, positions, triangles, normals, uvs, colors, materials, cutout: None }
+        TriangleMesh { name, positions, triangles, normals, uvs, colors, materials }
     }
 }

@@ -214,7 +214,6 @@ fn assemble(vertices: Vertices, faces: &Faces, path: &Path) -> Result<Model, Loa
         uvs: given(uvs),
         colors: given(colors),
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     drop_unused_vertices(&mut mesh);
     let part =
