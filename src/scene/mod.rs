@@ -3,6 +3,7 @@
 mod alpha_mask;
 mod bounds;
 mod camera;
+mod camera_rays;
 pub mod generate;
 mod light;
 pub mod load;
@@ -19,6 +20,7 @@ use glam::Vec3;
 pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
 pub use bounds::Bounds;
 pub use camera::Camera;
+pub use camera_rays::CameraRays;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
