@@ -46,7 +46,6 @@ fn scene(lights: usize) -> Scene {
         uvs: None,
         colors: None,
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     let light = |_| PointLight {
         position: random.in_box(Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.3, 1.0)),

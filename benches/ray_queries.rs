@@ -70,7 +70,6 @@ fn forest(triangles: usize) -> Scene {
         uvs: None,
         colors: None,
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     Scene {
         meshes: vec![Arc::new(mesh)],

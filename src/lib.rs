@@ -5,6 +5,7 @@
 pub mod accel;
 pub mod bench;
 pub mod cli;
+mod color;
 pub mod crosscheck;
 pub mod framing;
 pub mod image;

@@ -11,7 +11,7 @@ use crate::accel::{
     Accel, Backend, BackendChoice, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane,
 };
 use crate::light_mesh::SphereStrata;
-use crate::render::CameraRays;
+use crate::scene::CameraRays;
 use crate::scene::random::SplitMix64;
 use crate::with_accel;
 

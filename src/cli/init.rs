@@ -7,9 +7,10 @@ use clap::Args;
 
 use crate::accel::{Backend, BackendChoice, BackendError};
 use crate::framing::complete_view;
+use crate::image::tone::auto_exposure;
 use crate::image::{ImageError, OutputFile};
 use crate::render::render;
-use crate::scene::load::{LoadError, ModelFormat, OpenedScene, auto_exposure, complete, load_model};
+use crate::scene::load::{LoadError, ModelFormat, OpenedScene, complete, load_model};
 use crate::scene::{Camera, LightShape, PointLight};
 use crate::settings::{Integrator, Settings, Spacing};
 

@@ -11,10 +11,10 @@ use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
 use crate::framing::complete_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
-use crate::image::{Image, ImageError, exr::SampleType};
+use crate::image::{Image, ImageError, exr::SampleType, tone::auto_exposure};
 use crate::light_mesh::MeshError;
 use crate::render::{Film, RenderStats, render};
-use crate::scene::load::{LoadError, LoadedScene, OpenedScene, auto_exposure, open_scene};
+use crate::scene::load::{LoadError, LoadedScene, OpenedScene, open_scene};
 use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Settings, Spacing};
 use crate::with_accel;
 

@@ -115,11 +115,12 @@ impl<'a> Judge<'a> {
         if triangle as usize >= mesh.triangles.len() || !is_usable(&mesh.corners(triangle)) {
             return None;
         }
-        Self::test_local(ray, &local, mesh, instance, triangle)
+        self.test_local(ray, &local, mesh, instance, triangle)
     }
 
     /// [`Judge::test`] for a triangle that exists and is usable.
     fn test_local(
+        &self,
         ray: &Ray,
         local: &LocalRay,
         mesh: &TriangleMesh,
@@ -136,8 +137,8 @@ impl<'a> Judge<'a> {
         }
         let within = t - error > near && t + error < far;
         let mut certain = crossing.certain && within;
-        if let Some(opaque) = &mesh.cutout {
-            let answers = crossing.surroundings().map(|(u, v)| opaque(triangle, u, v));
+        if let Some(mask) = self.scene.alpha_mask(mesh, triangle) {
+            let answers = crossing.surroundings().map(|(u, v)| mask.is_opaque(mesh.uv(triangle, u, v)));
             if answers == [false; 9] && crossing.certain {
                 return None;
             }
@@ -173,7 +174,7 @@ impl<'a> Judge<'a> {
             let mesh = self.scene.instances[instance as usize].mesh as usize;
             let (tree, mesh) = (&self.trees[mesh], &self.scene.meshes[mesh]);
             tree.walk(&local.walker(), &mut inner, widened(limit), |triangle, _| {
-                if let Some(candidate) = Self::test_local(ray, &local, mesh, instance, triangle) {
+                if let Some(candidate) = self.test_local(ray, &local, mesh, instance, triangle) {
                     limit = limit.min(found(&candidate));
                 }
                 widened(limit)

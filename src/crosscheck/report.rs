@@ -19,7 +19,7 @@ pub enum Class {
     Agree,
     /// Another triangle at the same distance, within the error bound.
     Tie,
-    /// The ray passes an edge, an end of its interval, the rim of a cut-out or the plane of a triangle within the
+    /// The ray passes an edge, an end of its interval, the rim of an alpha mask or the plane of a triangle within the
     /// error bound.
     Graze,
     /// The ray runs in a triangle's plane, within the error bound, and the distance is not one of the triangle.

@@ -7,8 +7,7 @@ use glam::{Quat, Vec2, Vec3};
 use super::probe::{Probe, Sight};
 use crate::accel::Accel;
 use crate::light_mesh::SphereStrata;
-use crate::render::CameraRays;
-use crate::scene::{Bounds, Camera};
+use crate::scene::{Bounds, Camera, CameraRays};
 
 /// Vertical field of view, degrees.
 const FOV: f32 = 40.0;

@@ -101,7 +101,7 @@ impl Emitters {
             at = Vec2::ONE - at;
         }
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        if mesh.cutout.as_ref().is_some_and(|opaque| !opaque(triangle, at.x, at.y)) {
+        if !scene.is_opaque(mesh, triangle, at.x, at.y) {
             return None;
         }
         let mut hit = Hit { t: 1.0, u: at.x, v: at.y, instance, triangle };
@@ -146,7 +146,6 @@ mod tests {
                 uvs: None,
                 colors: None,
                 materials: TriangleMaterials::Uniform(0),
-                cutout: None,
             })],
             instances: vec![Instance { mesh: 0, to_world: None }],
             materials: vec![Material { emission: Vec3::ONE, ..Material::default() }],

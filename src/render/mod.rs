@@ -1,7 +1,6 @@
 //! Rendering as a wavefront (spec §9): camera paths of an image block → needed mesh points → evaluation in
 //! packets → shading.
 
-mod camera_rays;
 mod conventional;
 mod hybrid;
 mod light_mesh;
@@ -12,7 +11,6 @@ mod surface_group;
 mod tiles;
 mod wavefront;
 
-pub use camera_rays::CameraRays;
 pub use stats::{MeshCounters, RayCounters, RenderStats, StageSeconds};
 
 use self::conventional::ConventionalIntegrator;

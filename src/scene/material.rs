@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::TextureMap;
+use super::{AlphaMask, TextureMap};
 
 /// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (spec §7).
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Material {
     pub diffuse_map: Option<TextureMap>,
     /// Picture that multiplies Emiss.
     pub emission_map: Option<TextureMap>,
+    /// Where the surface is opaque; `None` for everywhere.
+    pub alpha_mask: Option<AlphaMask>,
 }
 
 impl Default for Material {
@@ -36,6 +38,7 @@ impl Default for Material {
             cull: false,
             diffuse_map: None,
             emission_map: None,
+            alpha_mask: None,
         }
     }
 }

@@ -1,7 +1,9 @@
 //! The scene: what is rendered. Immutable once loaded.
 
+mod alpha_mask;
 mod bounds;
 mod camera;
+mod camera_rays;
 pub mod generate;
 mod light;
 pub mod load;
@@ -15,16 +17,18 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
 pub use bounds::Bounds;
 pub use camera::Camera;
+pub use camera_rays::CameraRays;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
-pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
 
 /// Everything that is rendered, in world space of any unit of length.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// Unique geometry.
     pub meshes: Vec<Arc<TriangleMesh>>,

@@ -171,7 +171,6 @@ mod tests {
                 uvs: None,
                 colors: None,
                 materials: TriangleMaterials::Uniform(0),
-                cutout: None,
             })],
             instances: vec![Instance { mesh: 0, to_world }],
             materials: vec![Material { emission: Vec3::ONE, ..Material::default() }],

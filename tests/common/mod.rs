@@ -68,7 +68,6 @@ impl Builder {
             uvs: None,
             colors: None,
             materials: TriangleMaterials::PerTriangle(self.materials),
-            cutout: None,
         };
         Scene {
             meshes: vec![Arc::new(mesh)],

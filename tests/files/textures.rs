@@ -1,4 +1,4 @@
-//! Pictures on surfaces stand the right way up, whatever the format, and where they are cut out, sight and light pass.
+//! Pictures on surfaces stand the right way up, whatever the format, and where they are transparent, sight and light pass.
 
 use std::fs;
 use std::path::Path;
@@ -88,9 +88,9 @@ fn write_gltf(folder: &Path) {
 }
 
 /// Eye and lamp are in one place in front of the middle, so that what is seen is lit: the three colours where the picture
-/// has them, and the wall through the part that is cut out.
+/// has them, and the wall through the transparent part.
 #[test]
-fn pictures_stand_upright_and_cut_outs_let_sight_and_light_pass() {
+fn pictures_stand_upright_and_alpha_masks_let_sight_and_light_pass() {
     let folder = tempfile::tempdir().unwrap();
     write_obj(folder.path());
     write_gltf(folder.path());

@@ -10,7 +10,7 @@ use glam::Vec3;
 use lightmesh::accel::Accel;
 use lightmesh::image::metrics::{self, MetricsOptions};
 use lightmesh::image::{self, Image};
-use lightmesh::render::CameraRays;
+use lightmesh::scene::CameraRays;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::settings::Settings;

@@ -7,10 +7,11 @@ use std::path::Path;
 
 use glam::Vec3;
 use lightmesh::accel::{Accel, Backend, Ray};
+use lightmesh::image::tone::auto_exposure;
 use lightmesh::light_mesh::{DirectMesh, Neighbours};
-use lightmesh::render::{CameraRays, Film};
-use lightmesh::scene::load::{LoadedScene, auto_exposure, open_scene};
-use lightmesh::scene::{Interaction, PointLight, Scene};
+use lightmesh::render::Film;
+use lightmesh::scene::load::{LoadedScene, open_scene};
+use lightmesh::scene::{CameraRays, Interaction, PointLight, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 use lightmesh::with_accel;
 

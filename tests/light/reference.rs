@@ -28,7 +28,6 @@ fn rectangle(y: f32, x: (f32, f32), z: (f32, f32)) -> Arc<TriangleMesh> {
         uvs: None,
         colors: None,
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     })
 }
 

@@ -12,9 +12,9 @@ use lightmesh::accel::{
     Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, PacketLanes, Ray, RayHitPacket, RayPacket,
     hit_of_lane,
 };
-use lightmesh::scene::{CutOut, Scene, TriangleMesh};
+use lightmesh::scene::{Scene, TriangleMaterials, TriangleMesh};
 
-use crate::common::triangles::{self, Random, mesh, scene};
+use crate::common::triangles::{self, HOLES, INVISIBLE, Random, mesh, scene};
 
 fn single(mesh: Arc<TriangleMesh>) -> Scene {
     scene(vec![mesh], vec![(0, None)])
@@ -422,10 +422,11 @@ fn instanced_and_flattened_geometry_agree() {
 }
 
 #[test]
-fn cut_outs_let_rays_through_in_every_query() {
+fn alpha_masks_let_rays_through_in_every_query() {
     let mut random = Random::new(10);
-    let holes: CutOut =
-        Arc::new(|triangle, u, v| triangle % 2 == 0 && (u * 8.0) as i32 % 2 == (v * 8.0) as i32 % 2);
+    let holes = TriangleMaterials::PerTriangle(
+        (0..200).map(|i| if i % 2 == 0 { HOLES } else { INVISIBLE }).collect(),
+    );
     let solid = triangles::soup(&mut random, 200, 0.5, None);
     let leaves = triangles::soup(&mut random, 200, 0.5, None);
     let leaves = mesh(leaves.positions.as_slice().to_vec(), leaves.triangles.to_vec(), Some(holes));
@@ -433,7 +434,7 @@ fn cut_outs_let_rays_through_in_every_query() {
     let turned = Affine3A::from_rotation_y(0.7);
     check(&single(leaves.clone()), &rays);
     check(&scene(vec![solid, leaves], vec![(0, None), (1, None), (1, Some(turned))]), &rays);
-    let nothing: CutOut = Arc::new(|_, _, _| false);
+    let nothing = TriangleMaterials::Uniform(INVISIBLE);
     let sphere = sphere(8, 1.0);
     let invisible = mesh(sphere.positions.as_slice().to_vec(), sphere.triangles.to_vec(), Some(nothing));
     let accel = BvhAccel::build(&single(invisible)).unwrap();

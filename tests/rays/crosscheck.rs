@@ -1,7 +1,6 @@
 //! The cross-check tells rays that ray tracers may disagree about from rays that one of them gets wrong, and misses
 //! no wrong one.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Affine3A, Vec3};
@@ -11,14 +10,14 @@ use lightmesh::accel::{
 use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
-use lightmesh::scene::{CutOut, Scene};
+use lightmesh::scene::{Scene, TriangleMaterials};
 
-use crate::common::triangles::{mesh, scene};
+use crate::common::triangles::{RIM, mesh, scene};
 
 /// A square of two triangles at z = 0, from (0, 0) to (1, 1), whose diagonal runs from (0, 0) to (1, 1).
-fn square(cutout: Option<CutOut>) -> Scene {
+fn square(materials: Option<TriangleMaterials>) -> Scene {
     let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-    scene(vec![mesh(corners, vec![[0, 1, 2], [0, 2, 3]], cutout)], vec![(0, None)])
+    scene(vec![mesh(corners, vec![[0, 1, 2], [0, 2, 3]], materials)], vec![(0, None)])
 }
 
 /// A wavy sheet of `n` × `n` squares over [0, 1]².
@@ -233,11 +232,11 @@ fn a_wrong_distance_is_unexplained() {
     }
 }
 
-/// A cut-out's rim is a matter of rounding too; its inside and outside aren't.
+/// An alpha mask's rim is a matter of rounding too; its inside and outside aren't.
 #[test]
-fn cut_outs_are_judged_by_where_their_rim_is() {
-    // Triangle 0 has u = x − y and v = y: it is opaque where x − y > 1/4.
-    let scene = square(Some(Arc::new(|triangle, u, _| triangle == 1 || u > 0.25)));
+fn alpha_masks_are_judged_by_where_their_rim_is() {
+    // Triangle 0 has u = x − y and v = y: it is opaque where x − y ≥ 1/4.
+    let scene = square(Some(TriangleMaterials::PerTriangle(vec![RIM, 0])));
     let other = |_: &Ray, hit: Option<Hit>| match hit {
         Some(_) => None,
         None => Some(Hit { t: 1.0, u: 0.25, v: 0.25, instance: 0, triangle: 0 }),

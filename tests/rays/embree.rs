@@ -11,10 +11,10 @@ use lightmesh::{
         RayHitPacket, hit_of_lane,
     },
     crosscheck::{Judge, Subject, check_rays},
-    scene::{CutOut, Scene, TriangleMesh},
+    scene::{Scene, TriangleMaterials, TriangleMesh},
 };
 
-use crate::common::triangles::{Random, mesh, scene, soup};
+use crate::common::triangles::{HOLES, INVISIBLE, Random, mesh, scene, soup};
 
 /// The backend over a scene. Without Embree the test is skipped, aloud; where `REQUIRE_EMBREE` is set it fails,
 /// as it does where that names another major version.
@@ -191,12 +191,14 @@ fn packets_lose_no_hits_in_instances_that_are_turned_by_quarters() {
     assert!(lost.is_none(), "{} rays, such as {}", checked.counts[1].unexplained, lost.unwrap());
 }
 
-/// A cut-out decides in nearest hits and in occlusion alike, also through instances.
+/// An alpha mask decides in nearest hits and in occlusion alike, also through instances.
 #[test]
-fn cut_outs_let_rays_through() {
+fn alpha_masks_let_rays_through() {
     let mut random = Random::new(3);
-    let cutout: CutOut = Arc::new(|triangle, u, v| triangle % 3 != 0 && (u > 0.3 || v > 0.5));
-    let meshes = vec![soup(&mut random, 150, 0.5, Some(cutout))];
+    let holes = TriangleMaterials::PerTriangle(
+        (0..150).map(|i| if i % 3 == 0 { INVISIBLE } else { HOLES }).collect(),
+    );
+    let meshes = vec![soup(&mut random, 150, 0.5, Some(holes))];
     let to_world = Affine3A::from_scale(Vec3::new(0.7, -1.2, 1.0));
     let rays = rays(&mut random, 3000);
     check(&scene(meshes, vec![(0, None), (0, Some(to_world))]), &rays);

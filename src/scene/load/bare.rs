@@ -87,18 +87,3 @@ fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
     // Two digits say what is meant.
     format!("{spacing:.1e}").parse().unwrap_or(spacing)
 }
-
-/// Exposure in stops at which a picture is neither dark nor washed out: nine tenths of what is lit stay below 60 % of
-/// white.
-pub fn auto_exposure(pixels: &[[f32; 3]]) -> f32 {
-    let luminance = |[r, g, b]: &[f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let lit = pixels.iter().map(luminance).filter(|l| l.is_finite() && *l > 0.0);
-    let mut lit: Vec<f32> = lit.collect();
-    if lit.is_empty() {
-        return 0.0;
-    }
-    let tenth = lit.len() * 9 / 10;
-    let (_, bright, _) = lit.select_nth_unstable_by(tenth, f32::total_cmp);
-    // Quarters of a stop, so that two renders of nearly the same picture get the same.
-    ((0.6 / *bright).log2() * 4.0).round().clamp(-160.0, 160.0) / 4.0
-}

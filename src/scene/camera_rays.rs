@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
+use super::Camera;
 use crate::accel::Ray;
-use crate::scene::Camera;
 
 /// Maps positions in the image to camera rays.
 #[derive(Clone, Debug)]
@@ -91,7 +91,7 @@ mod tests {
         }
     }
 
-    /// At 90° the picture's upper edge is 45° above its middle, and right is right.
+    /// At 90° the image's upper edge is 45° above its middle, and right is right.
     #[test]
     fn the_field_of_view_is_vertical() {
         let rays = CameraRays::new(&camera(), (200, 100), 1);
