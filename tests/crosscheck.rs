@@ -11,12 +11,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Affine3A, Vec3};
 use lightmesh::accel::{
-    Accel, BruteForceAccel, BvhAccel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket,
+    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket,
 };
 use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
-use lightmesh::scene::{CutOut, Scene};
+use lightmesh::scene::{CutOut, Hit, Ray, Scene};
 use triangles::{mesh, scene};
 
 /// A square of two triangles at z = 0, from (0, 0) to (1, 1), whose diagonal runs from (0, 0) to (1, 1).

@@ -11,11 +11,11 @@ use embree_sys::Library;
 use glam::{Affine3A, DMat3, DQuat, DVec3, Mat3, Vec3};
 use lightmesh::{
     accel::{
-        Accel, BruteForceAccel, BvhAccel, Coherence, EmbreeAccel, EmbreeError, Hit, PacketLanes, Ray,
-        RayHitPacket, hit_of_lane,
+        Accel, BruteForceAccel, BvhAccel, Coherence, EmbreeAccel, EmbreeError, PacketLanes, RayHitPacket,
+        hit_of_lane,
     },
     crosscheck::{Judge, Subject, check_rays},
-    scene::{CutOut, Scene, TriangleMesh},
+    scene::{CutOut, Hit, Ray, Scene, TriangleMesh},
 };
 use triangles::{Random, mesh, scene, soup};
 

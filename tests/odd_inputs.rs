@@ -10,12 +10,12 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
 use lightmesh::accel::{
-    Accel, Backend, BackendChoice, Coherence, INVALID_ID, MAX_COORDINATE, MIN_DIRECTION, PacketLanes, Ray,
+    Accel, Backend, BackendChoice, Coherence, INVALID_ID, MAX_COORDINATE, MIN_DIRECTION, PacketLanes,
     RayHitPacket, hit_of_lane,
 };
 use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::scene::random::SplitMix64;
-use lightmesh::scene::{CutOut, Scene, TriangleMesh};
+use lightmesh::scene::{CutOut, Ray, Scene, TriangleMesh};
 use lightmesh::with_accel;
 use triangles::{Random, mesh, scene, soup};
 

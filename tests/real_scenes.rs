@@ -9,11 +9,11 @@ use std::path::Path;
 
 use common::{backend, conventional, picture};
 use glam::Vec3;
-use lightmesh::accel::{Accel, Backend, Ray};
+use lightmesh::accel::{Accel, Backend};
 use lightmesh::light_mesh::{DirectMesh, Neighbours};
 use lightmesh::render::{CameraRays, Film};
 use lightmesh::scene::load::{LoadedScene, auto_exposure, open_scene};
-use lightmesh::scene::{Interaction, PointLight, Scene};
+use lightmesh::scene::{Interaction, PointLight, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 use lightmesh::with_accel;
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use crate::scene::{Scene, TriangleMesh};
+use crate::scene::{Hit, Ray, Scene, TriangleMesh};
 
 use super::bvh::WorldToObject;
 use super::{
-    Accel, Coherence, Hit, INVALID_ID, LaneMask, MAX_COORDINATE, Ray, RayHitPacket, RayPacket,
+    Accel, Coherence, INVALID_ID, LaneMask, MAX_COORDINATE, RayHitPacket, RayPacket, is_valid_ray,
     largest_coordinate,
 };
 
@@ -46,7 +46,7 @@ impl BruteForceAccel {
 
     /// Calls `found` with every hit; stops when that returns true.
     fn each_hit(&self, ray: &Ray, mut found: impl FnMut(Hit) -> bool) {
-        if !ray.is_valid(self.largest) {
+        if !is_valid_ray(ray, self.largest) {
             return;
         }
         for (instance, (mesh, placement)) in self.instances.iter().enumerate() {

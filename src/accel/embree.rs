@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use embree_sys::{Device, Error, Geometry, Library, SceneBuilder};
 use thiserror::Error as ThisError;
 
-use super::ray::columns;
-use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Scene, TriangleMesh};
+use super::limits::columns;
+use super::{Accel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket};
+use crate::scene::{Hit, Ray, Scene, TriangleMesh};
 
 /// What keeps Embree from being used.
 #[derive(Clone, Debug, ThisError)]

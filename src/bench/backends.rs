@@ -8,10 +8,11 @@ use super::setup::{PAPER_TRIANGLES, Setup, forest, new_report};
 use super::timing::{Samples, timed};
 use super::{BenchError, BenchOptions};
 use crate::accel::{
-    Accel, Backend, BackendChoice, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane,
+    Accel, Backend, BackendChoice, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane,
 };
 use crate::light_mesh::SphereStrata;
 use crate::render::CameraRays;
+use crate::scene::Ray;
 use crate::scene::random::SplitMix64;
 use crate::with_accel;
 

@@ -8,12 +8,11 @@ use clap::Args;
 use glam::Vec3;
 
 use super::progress::Reporter;
-use crate::accel::{
-    Accel, Backend, BackendChoice, BackendError, MemoryLimitError, Ray, check_memory, parse_size,
-};
+use crate::accel::{Accel, Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
 use crate::crosscheck::{Options, RayTextError, Subject, crosscheck, from_text, replay, watertightness};
 use crate::image::{ImageError, OutputFile};
 use crate::render::Progress;
+use crate::scene::Ray;
 use crate::scene::load::{LoadError, open_scene};
 use crate::with_accel;
 

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::boxes::{BoxTree, Stack, Walker};
 use super::placement::Placement;
-use crate::accel::{Hit, MAX_COORDINATE, Ray, largest_coordinate};
-use crate::scene::{Bounds, Scene, TriangleMesh};
+use crate::accel::{MAX_COORDINATE, is_valid_ray, largest_coordinate};
+use crate::scene::{Bounds, Hit, Ray, Scene, TriangleMesh};
 
 /// How far a corner seems moved, in units of its distance from the ray's origin: 16 roundings of 2⁻²⁴.
 pub const BOUND: f64 = 16.0 / (1 << 24) as f64;
@@ -102,7 +102,7 @@ impl<'a> Judge<'a> {
 
     /// Whether the ray can hit anything at all.
     pub fn is_ray(&self, ray: &Ray) -> bool {
-        ray.is_valid(self.largest)
+        is_valid_ray(ray, self.largest)
     }
 
     /// Whether a ray hits a triangle; `None` where every ray tracer must say no.

@@ -3,11 +3,10 @@
 use glam::{Vec2, Vec3};
 
 use super::queries::Ask;
-use crate::accel::Ray;
 use crate::light_mesh::LightTable;
 use crate::render::CameraRays;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, Camera, PointLight, Scene, SurfacePoint};
+use crate::scene::{Bounds, Camera, PointLight, Ray, Scene, SurfacePoint};
 
 macro_rules! kinds {
     ($($kind:ident $name:literal $what:literal,)*) => {

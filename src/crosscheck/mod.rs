@@ -15,6 +15,7 @@ mod watertight;
 
 use rayon::prelude::*;
 
+use crate::scene::{Camera, Hit, Ray, Scene};
 pub use judge::{BOUND, Candidate, Judge, Truth};
 pub use kinds::{Kind, RaySource};
 pub use queries::{Answer, Answers, Ask, Query, packets};
@@ -22,9 +23,6 @@ pub use ray_text::{RayTextError, from_text, to_text};
 pub use replay::{Replay, replay};
 pub use report::{Class, Counts, KindCounts, Report, Unexplained};
 pub use watertight::{Escapes, Watertightness, watertightness};
-
-use crate::accel::{Hit, Ray};
-use crate::scene::{Camera, Scene};
 
 /// Rays that are made and asked about together, all of one kind.
 const BLOCK: u64 = 4096;

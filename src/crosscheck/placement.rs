@@ -3,8 +3,8 @@
 use glam::{Affine3A, DMat3, DVec3};
 
 use super::judge::{BOUND, LocalRay};
-use crate::accel::{Ray, largest_coordinate_of};
-use crate::scene::Bounds;
+use crate::accel::largest_coordinate_of;
+use crate::scene::{Bounds, Ray};
 
 /// Where an instance's triangles are.
 #[derive(Clone, Debug)]

@@ -1,7 +1,8 @@
 //! The queries of a backend, and how they are asked.
 
 use super::GROUP;
-use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::scene::{Hit, Ray};
 
 /// Rays per packet; 1 for single rays.
 pub const WIDTHS: [usize; 4] = [1, 4, 8, 16];

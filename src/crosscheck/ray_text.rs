@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use glam::Vec3;
 
-use crate::accel::Ray;
+use crate::scene::Ray;
 
 /// What is wrong with a ray's text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

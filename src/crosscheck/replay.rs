@@ -7,8 +7,7 @@ use super::queries::Query;
 use super::ray_text::to_text;
 use super::report::describe;
 use super::{Checked, GROUP, Subject, check_rays};
-use crate::accel::Ray;
-use crate::scene::Scene;
+use crate::scene::{Ray, Scene};
 
 /// Candidates that are listed.
 const LISTED: usize = 16;

@@ -9,7 +9,7 @@ use super::kinds::Kind;
 use super::queries::{Answer, Query};
 use super::ray_text::to_text;
 use super::{Checked, KEPT, Options};
-use crate::accel::{Hit, Ray};
+use crate::scene::{Hit, Ray};
 
 /// What became of a ray, the worse the later.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,9 +8,8 @@ use serde::Serialize;
 
 use super::queries::{Ask, Query};
 use super::{BLOCK, GROUP, Subject};
-use crate::accel::Ray;
-use crate::scene::Scene;
 use crate::scene::random::SplitMix64;
+use crate::scene::{Ray, Scene};
 
 /// Of this many rays one may escape.
 const GOAL: u64 = 10_000_000;

@@ -1,9 +1,7 @@
 //! Camera rays through stratified positions in the pixels.
 
+use crate::scene::{Camera, Ray};
 use glam::{Vec2, Vec3};
-
-use crate::accel::Ray;
-use crate::scene::Camera;
 
 /// Maps positions in the image to camera rays.
 #[derive(Clone, Debug)]

@@ -8,6 +8,7 @@ pub mod load;
 mod material;
 mod mesh;
 pub mod random;
+mod ray;
 mod surface;
 mod texture;
 
@@ -20,6 +21,7 @@ pub use camera::Camera;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use ray::{Hit, Ray};
 pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
 
