@@ -12,6 +12,7 @@ mod limits;
 mod memory;
 mod packet;
 
+pub(crate) use backend::with_accel;
 pub use backend::{Backend, BackendChoice, BackendError, Chosen};
 pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
