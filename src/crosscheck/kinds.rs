@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::queries::Ask;
+use super::queries::{GROUP, RayQueries};
 use crate::light_mesh::LightTable;
 use crate::render::CameraRays;
 use crate::scene::random::SplitMix64;
@@ -53,7 +53,7 @@ const RESOLUTION: (u32, u32) = (1024, 768);
 const SAMPLES: u32 = 16;
 
 /// Rays that are made in one place, or each somewhere else: as many as are asked about in one go.
-const RUN: usize = super::GROUP;
+const RUN: usize = GROUP;
 
 /// Of so many runs one has its rays apart.
 const APART: u64 = 4;
@@ -87,13 +87,13 @@ pub struct RaySource<'a> {
     /// Triangles up to and with each instance.
     triangles: Vec<u64>,
     /// Finds the surface points.
-    tracer: &'a dyn Ask,
+    tracer: &'a dyn RayQueries,
     seed: u64,
 }
 
 impl<'a> RaySource<'a> {
     /// A scene without lights gets a few in its corners.
-    pub fn new(scene: &'a Scene, cameras: &[Camera], tracer: &'a dyn Ask, seed: u64) -> Self {
+    pub fn new(scene: &'a Scene, cameras: &[Camera], tracer: &'a dyn RayQueries, seed: u64) -> Self {
         let mut bounds = scene.bounds();
         if bounds.is_empty() {
             bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };

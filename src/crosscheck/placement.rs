@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, DMat3, DVec3};
 
-use super::judge::{BOUND, LocalRay};
+use super::local_ray::{BOUND, LocalRay};
 use crate::accel::largest_coordinate_of;
 use crate::scene::{Bounds, Ray};
 

@@ -1,8 +1,14 @@
 //! The queries of a backend, and how they are asked.
 
-use super::GROUP;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 use crate::scene::{Hit, Ray};
+
+/// Rays that are made and asked about together, all of one kind.
+pub const BLOCK: u64 = 4096;
+
+/// Rays that are asked about in one go, in all forms of query: what the first reads of a tree is still in the
+/// processor's cache for the others.
+pub const GROUP: usize = 64;
 
 /// Rays per packet; 1 for single rays.
 pub const WIDTHS: [usize; 4] = [1, 4, 8, 16];
@@ -70,14 +76,14 @@ pub struct Answers {
 }
 
 /// An [`Accel`] whose type is forgotten.
-pub trait Ask: Send + Sync {
+pub trait RayQueries: Send + Sync {
     /// Asks about all rays, in [`packets`].
     fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers;
     /// The nearest hit of one ray.
     fn nearest(&self, ray: &Ray) -> Option<Hit>;
 }
 
-impl<A: Accel> Ask for A {
+impl<A: Accel> RayQueries for A {
     fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers {
         match (query.occlusion, query.width) {
             (false, 4) => nearest::<A, 4>(self, group, rays),
@@ -100,6 +106,15 @@ impl<A: Accel> Ask for A {
     fn nearest(&self, ray: &Ray) -> Option<Hit> {
         self.intersect(ray)
     }
+}
+
+/// A backend under test.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// Name in tables.
+    pub name: &'a str,
+    /// The backend.
+    pub accel: &'a dyn RayQueries,
 }
 
 /// Cuts rays into packets of `width`, every eighth of them partly filled as the last ones of a list are, with

@@ -2,11 +2,11 @@
 
 use std::fmt;
 
+use super::check::check_rays;
+use super::findings::{Checked, describe};
 use super::judge::{Candidate, Judge};
-use super::queries::Query;
+use super::queries::{GROUP, Query, Subject};
 use super::ray_text::to_text;
-use super::report::describe;
-use super::{Checked, GROUP, Subject, check_rays};
 use crate::scene::{Ray, Scene};
 
 /// Candidates that are listed.

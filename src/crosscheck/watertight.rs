@@ -6,8 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::queries::{Ask, Query};
-use super::{BLOCK, GROUP, Subject};
+use super::queries::{BLOCK, GROUP, Query, RayQueries, Subject};
 use crate::scene::random::SplitMix64;
 use crate::scene::{Ray, Scene};
 
@@ -125,7 +124,7 @@ pub fn watertightness(
     Watertightness { rows }
 }
 
-fn distance_to_walls(accel: &dyn Ask, inside: Vec3) -> f32 {
+fn distance_to_walls(accel: &dyn RayQueries, inside: Vec3) -> f32 {
     let mut random = SplitMix64::new(1);
     let hits = (0..PROBES).filter_map(|_| {
         let ray = Ray::new(inside, in_ball(&mut random).normalize_or(Vec3::X));
@@ -134,7 +133,7 @@ fn distance_to_walls(accel: &dyn Ask, inside: Vec3) -> f32 {
     Some(hits.fold(f32::INFINITY, f32::min)).filter(|t| t.is_finite()).unwrap_or(0.0)
 }
 
-fn count_escapes(accel: &dyn Ask, rays: &[Ray]) -> u64 {
+fn count_escapes(accel: &dyn RayQueries, rays: &[Ray]) -> u64 {
     let of_group = |(number, rays): (usize, &[Ray])| {
         let mut escaped = [false; GROUP];
         for query in Query::all() {
