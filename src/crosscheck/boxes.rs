@@ -174,7 +174,7 @@ fn split(boxes: &mut [(Bounds, u32)], centers: &Bounds) -> usize {
         }
     }
     if best == 0 {
-        // All centers in one place, or not to be told apart.
+        // All centers are in one place, or too close for the bins.
         let half = boxes.len() / 2;
         boxes.select_nth_unstable_by(half, |a, b| a.0.center()[axis].total_cmp(&b.0.center()[axis]));
         return half;

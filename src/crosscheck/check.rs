@@ -22,7 +22,7 @@ struct Disagreement {
     answer: Option<Answer>,
 }
 
-/// Asks all subjects about some rays and judges what they disagree about.
+/// Traces some rays with all subjects and judges what they disagree about.
 pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked {
     let counts = vec![Counts::default(); subjects.len()];
     let mut checked = Checked { rays: rays.len() as u64, counts, ..Checked::default() };
@@ -37,10 +37,10 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
     let mut disagreements = Vec::new();
     for (subject, Subject { accel, .. }) in subjects.iter().enumerate() {
         for query in Query::all() {
-            let Answers { answers, strays } = accel.ask(query, group, rays);
+            let Answers { answers, strays } = accel.trace(query, group, rays);
             if reference.is_empty() {
-                // The first subject's nearest hits of single rays.
-                reference = answers.iter().map(Answer::nearest).collect();
+                // The first subject's closest hits of single rays.
+                reference = answers.iter().map(Answer::closest).collect();
             }
             for (ray, (answer, reference)) in answers.iter().zip(&reference).enumerate() {
                 if !equal(answer, reference.as_ref()) {
@@ -56,9 +56,9 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
 
     let mut left = disagreements.as_slice();
     let mut classes = vec![Class::Agree; subjects.len()];
-    // Whether one of the subject's nearest hits that differ is in order.
+    // Whether one of the subject's closest hits that differ is in order.
     let mut named = vec![false; subjects.len()];
-    // What has been said of the same ray already; most queries answer the same.
+    // Answers about the same ray that are classed already; most queries answer the same.
     let mut judged: Vec<(Answer, Option<Class>)> = Vec::new();
     for (index, (ray, reference)) in rays.iter().zip(&reference).enumerate() {
         let (found, others) = left.split_at(left.partition_point(|found| found.ray == index));
@@ -89,10 +89,10 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
                 });
             }
         };
-        if !judge.admits_nearest(ray, &truth, reference.as_ref()) {
+        if !judge.admits_closest(ray, &truth, reference.as_ref()) {
             classes[0] = Class::Unexplained;
             let query = Query { occlusion: false, width: 1 };
-            complain(0, query, Some(Answer::Nearest(*reference)));
+            complain(0, query, Some(Answer::Closest(*reference)));
         }
         for Disagreement { subject, query, answer, .. } in found {
             let class = answer.and_then(|answer| {
@@ -104,12 +104,12 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
                 judged.push((answer, class));
                 class
             });
-            // What stands in the way is named by the nearest hits, which came first. If the truth knows of nothing
+            // The closest hits, which came first, name the triangle in the way. If the truth knows of nothing
             // there, it is seen edge-on from afar.
-            named[*subject] |= class.is_some() && matches!(answer, Some(Answer::Nearest(Some(_))));
+            named[*subject] |= class.is_some() && matches!(answer, Some(Answer::Closest(Some(_))));
             let edge_on = *answer == Some(Answer::Occluded(true)) && named[*subject];
             let class = class.or(edge_on.then_some(Class::InPlane));
-            // The first query that fails tells enough.
+            // One failed query of a subject is reported.
             if class.is_none() && classes[*subject] != Class::Unexplained {
                 complain(*subject, *query, *answer);
             }
@@ -119,10 +119,10 @@ fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], 
     }
 }
 
-/// Whether an answer is the reference's, as far as single precision can tell.
+/// Whether an answer is the reference's, within the rounding of single precision.
 fn equal(answer: &Answer, reference: Option<&Hit>) -> bool {
     match (answer, reference) {
-        (Answer::Nearest(Some(a)), Some(b)) => {
+        (Answer::Closest(Some(a)), Some(b)) => {
             let same = (a.instance, a.triangle) == (b.instance, b.triangle);
             same && (a.t - b.t).abs() <= NEGLIGIBLE * a.t.abs()
         }
@@ -132,7 +132,7 @@ fn equal(answer: &Answer, reference: Option<&Hit>) -> bool {
 
 fn admits(judge: &Judge, ray: &Ray, truth: &Truth, answer: &Answer) -> bool {
     match answer {
-        Answer::Nearest(hit) => judge.admits_nearest(ray, truth, hit.as_ref()),
+        Answer::Closest(hit) => judge.admits_closest(ray, truth, hit.as_ref()),
         Answer::Occluded(occluded) => Judge::admits_occlusion(truth, *occluded),
     }
 }
@@ -140,7 +140,7 @@ fn admits(judge: &Judge, ray: &Ray, truth: &Truth, answer: &Answer) -> bool {
 /// What kind of difference it is that has an explanation.
 fn explained(judge: &Judge, ray: &Ray, answer: &Answer, reference: Option<&Hit>, worst: &mut f64) -> Class {
     let candidate = |hit: &Hit| judge.test(ray, hit.instance, hit.triangle);
-    let Answer::Nearest(Some(a)) = answer else { return Class::Graze };
+    let Answer::Closest(Some(a)) = answer else { return Class::Graze };
     let Some(first) = candidate(a) else { return Class::Graze };
     if !first.is_near(f64::from(a.t)) {
         return Class::InPlane;

@@ -10,7 +10,7 @@ const UNDERFLOW: f64 = 1e-40;
 /// Products beyond this may overflow in single precision.
 const OVERFLOW: f64 = 1e37;
 
-/// A ray and a triangle that can't be told to miss each other.
+/// A ray and a triangle that don't miss each other for certain.
 pub struct Crossing {
     /// Distance, in units of the direction's length.
     pub t: f64,

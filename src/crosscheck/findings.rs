@@ -88,7 +88,7 @@ pub struct Unexplained {
     pub query: Query,
     /// The answer; `None` where a lane answered that was switched off.
     pub answer: Option<Answer>,
-    /// What the reference says.
+    /// The answer of the reference.
     pub reference: Option<Hit>,
     /// What is true.
     pub truth: Truth,
@@ -103,8 +103,8 @@ pub struct Unexplained {
 /// An answer in words.
 pub(super) fn describe(answer: &Answer) -> String {
     match answer {
-        Answer::Nearest(None) => "nothing".to_owned(),
-        Answer::Nearest(Some(hit)) => {
+        Answer::Closest(None) => "nothing".to_owned(),
+        Answer::Closest(Some(hit)) => {
             format!("triangle {} of instance {} at t = {:?}", hit.triangle, hit.instance, hit.t)
         }
         Answer::Occluded(true) => "occluded".to_owned(),
@@ -126,7 +126,7 @@ impl fmt::Display for Unexplained {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let answer = self.answer.as_ref().map_or("an inactive lane answered".to_owned(), describe);
         writeln!(f, "unexplained: {}, {}: {answer}", self.backend, self.query)?;
-        writeln!(f, "  reference: {}; truth: {}", describe(&Answer::Nearest(self.reference)), self.truth)?;
+        writeln!(f, "  reference: {}; truth: {}", describe(&Answer::Closest(self.reference)), self.truth)?;
         writeln!(f, "  --replay={}", to_text(&self.ray))?;
         if self.packet.len() > 1 {
             writeln!(f, "  lane {} of the packet", self.lane)?;

@@ -1,7 +1,7 @@
 //! What is true of a ray, in double precision, and what single precision may make of it.
 //!
 //! The bounds are derived in docs/crosscheck.md. In short: a ray tracer in single precision sees every corner
-//! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] asks whether a triangle is
+//! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] decides whether a triangle is
 //! hit, missed, or within that doubt.
 
 use glam::Vec3;
@@ -14,7 +14,7 @@ use super::placement::Placement;
 use crate::accel::{MAX_COORDINATE, is_valid_ray, largest_coordinate};
 use crate::scene::{Bounds, Hit, Ray, Scene, TriangleMesh};
 
-/// A triangle that a ray hits, or that it may be said to hit.
+/// A triangle that a ray hits, or may be reported to hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// Index into [`Scene::instances`].
@@ -44,7 +44,7 @@ impl Candidate {
     }
 }
 
-/// What may be said of a ray.
+/// What the answers about a ray may be.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     /// No certain hit ends later than this; infinite if there is none.
@@ -98,7 +98,7 @@ impl<'a> Judge<'a> {
         is_valid_ray(ray, self.largest)
     }
 
-    /// Whether a ray hits a triangle; `None` where every ray tracer must say no.
+    /// Whether a ray hits a triangle; `None` where no ray tracer may report it.
     pub fn test(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<Candidate> {
         if !self.is_ray(ray) {
             return None;
@@ -175,8 +175,8 @@ impl<'a> Judge<'a> {
         });
     }
 
-    /// Whether a nearest hit may be reported.
-    pub fn admits_nearest(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
+    /// Whether a closest hit may be reported.
+    pub fn admits_closest(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
         let Some(hit) = hit else { return truth.certain_before == f64::INFINITY };
         let t = f64::from(hit.t);
         let inside = hit.t >= ray.t_near.max(0.0) && hit.t <= ray.t_far;

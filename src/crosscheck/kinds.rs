@@ -1,4 +1,4 @@
-//! The rays that are asked about: those of rendering, and those that break ray tracers.
+//! The rays that are traced: those of rendering, and those that break ray tracers.
 
 use glam::{Vec2, Vec3};
 
@@ -46,13 +46,13 @@ kinds! {
 /// Side of the squares of pixels that camera rays go through.
 const SQUARE: u32 = 64;
 
-/// Resolution of the pictures that camera rays are taken from.
+/// Resolution of the images that camera rays are taken from.
 const RESOLUTION: (u32, u32) = (1024, 768);
 
 /// Camera rays per pixel to choose from.
 const SAMPLES: u32 = 16;
 
-/// Rays that are made in one place, or each somewhere else: as many as are asked about in one go.
+/// Rays that are made in one place, or each somewhere else: as many as are traced in one go.
 const RUN: usize = GROUP;
 
 /// Of so many runs one has its rays apart.
@@ -214,7 +214,7 @@ impl<'a> RaySource<'a> {
                 Some(camera) => camera.ray(x, y, random.next() as u32 % SAMPLES),
                 None => Ray::new(self.anywhere(random), direction(random)),
             };
-            if let Some(hit) = self.tracer.nearest(&ray) {
+            if let Some(hit) = self.tracer.closest(&ray) {
                 return (ray.direction, self.scene.interaction(&hit, ray.direction).point);
             }
             pixel = self.pixel(random);

@@ -41,10 +41,10 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Asks all subjects about rays of all kinds, in all forms of query, on rayon's threads.
+/// Traces rays of all kinds with all subjects, in all forms of query, on rayon's threads.
 ///
-/// The first subject's nearest hits of single rays are what all answers are compared with. The report depends on
-/// scene and options alone. `progress` hears of every block, with the number of rays in it.
+/// The first subject's closest hits of single rays are what all answers are compared with. The report depends on
+/// scene and options alone. `progress` receives the number of rays of every block that is done.
 pub fn crosscheck(
     scene: &Scene,
     cameras: &[Camera],

@@ -27,7 +27,7 @@ pub struct KindCounts {
 pub struct Report {
     /// Names of the backends, the reference first.
     pub backends: Vec<String>,
-    /// Rays asked about.
+    /// Rays that were traced.
     pub rays: u64,
     /// What the rays followed from.
     pub seed: u64,
@@ -83,7 +83,7 @@ impl Report {
                 "backend": one.backend,
                 "query": one.query.to_string(),
                 "answer": one.answer.map(|answer| describe(&answer)),
-                "reference": describe(&Answer::Nearest(one.reference)),
+                "reference": describe(&Answer::Closest(one.reference)),
                 "truth": one.truth.to_string(),
                 "ray": to_text(&one.ray),
                 "packet": one.packet.iter().map(to_text).collect::<Vec<_>>(),

@@ -33,7 +33,7 @@ pub struct Escapes {
     pub backend: String,
     /// What was aimed at.
     pub aim: &'static str,
-    /// Rays, each of them asked about in every form of query.
+    /// Rays, each of them traced in every form of query.
     pub rays: u64,
     /// Rays that escaped from one of the queries at least.
     pub escaped: u64,
@@ -128,7 +128,7 @@ fn distance_to_walls(accel: &dyn RayQueries, inside: Vec3) -> f32 {
     let mut random = SplitMix64::new(1);
     let hits = (0..PROBES).filter_map(|_| {
         let ray = Ray::new(inside, in_ball(&mut random).normalize_or(Vec3::X));
-        accel.nearest(&ray).map(|hit| hit.t)
+        accel.closest(&ray).map(|hit| hit.t)
     });
     Some(hits.fold(f32::INFINITY, f32::min)).filter(|t| t.is_finite()).unwrap_or(0.0)
 }
@@ -137,7 +137,7 @@ fn count_escapes(accel: &dyn RayQueries, rays: &[Ray]) -> u64 {
     let of_group = |(number, rays): (usize, &[Ray])| {
         let mut escaped = [false; GROUP];
         for query in Query::all() {
-            for (escaped, answer) in escaped.iter_mut().zip(accel.ask(query, number, rays).answers) {
+            for (escaped, answer) in escaped.iter_mut().zip(accel.trace(query, number, rays).answers) {
                 *escaped |= !answer.is_hit();
             }
         }
