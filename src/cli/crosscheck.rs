@@ -8,14 +8,12 @@ use clap::Args;
 use glam::Vec3;
 
 use super::progress::Reporter;
-use crate::accel::{
-    Accel, Backend, BackendChoice, BackendError, MemoryLimitError, Ray, check_memory, parse_size,
-};
+use crate::accel::{Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
 use crate::crosscheck::{Options, RayTextError, Subject, crosscheck, from_text, replay, watertightness};
 use crate::image::{ImageError, OutputFile};
 use crate::render::Progress;
+use crate::scene::Ray;
 use crate::scene::load::{LoadError, open_scene};
-use crate::with_accel;
 
 /// What `crosscheck` takes.
 #[derive(Args, Debug)]
@@ -121,11 +119,8 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Verdict, Crossc
         reporter.line(&format!("note: {notice}"));
     }
     let names: Vec<_> = backends.iter().map(ToString::to_string).collect();
-    let subjects: Vec<_> = names
-        .iter()
-        .zip(&backends)
-        .map(|(name, backend)| with_accel!(backend, accel => subject(name, accel)))
-        .collect();
+    let subjects: Vec<_> =
+        names.iter().zip(&backends).map(|(name, backend)| Subject { name, accel: backend }).collect();
 
     if let Some(rays) = rays {
         let replay = pool.install(|| replay(scene, &subjects, &rays));
@@ -168,10 +163,6 @@ fn point(text: &str) -> Result<Vec3, String> {
 
 fn verdict(clean: bool) -> Verdict {
     if clean { Verdict::Passed } else { Verdict::Failed }
-}
-
-fn subject<'a>(name: &'a str, accel: &'a impl Accel) -> Subject<'a> {
-    Subject { name, accel }
 }
 
 /// The rays of a file, or the one ray that is given itself.

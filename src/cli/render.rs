@@ -16,7 +16,6 @@ use crate::light_mesh::MeshError;
 use crate::render::{Film, RenderStats, render};
 use crate::scene::load::{LoadError, LoadedScene, OpenedScene, open_scene};
 use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Settings, Spacing};
-use crate::with_accel;
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
@@ -320,7 +319,7 @@ fn render_to(
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,
-        acceleration_bytes: with_accel!(&chosen.backend, accel => accel.memory_bytes()),
+        acceleration_bytes: chosen.backend.memory_bytes(),
         peak_rss_bytes: peak_rss_bytes(),
         non_finite_pixels,
     };

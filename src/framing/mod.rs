@@ -10,10 +10,9 @@ mod outside;
 mod probe;
 
 use self::probe::Probe;
-use crate::accel::{Accel, Backend};
+use crate::accel::{Accel, Backend, with_accel};
 use crate::scene::load::OpenedScene;
 use crate::scene::{Camera, PointLight};
-use crate::with_accel;
 
 /// Gives a scene without a camera one, and a bare model without lights some; says so in [`OpenedScene::choices`].
 pub fn complete_view(opened: &mut OpenedScene, backend: &Backend) {

@@ -10,6 +10,7 @@ pub mod load;
 mod material;
 mod mesh;
 pub mod random;
+mod ray;
 mod surface;
 mod texture;
 
@@ -24,6 +25,7 @@ pub use camera_rays::CameraRays;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
 pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use ray::{Hit, Ray};
 pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
 

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use glam::Vec3;
-use lightmesh::accel::{Accel, BvhAccel, Coherence, Hit, LaneMask, Ray, RayHitPacket, RayPacket};
+use lightmesh::accel::{Accel, BvhAccel, Coherence, LaneMask, RayHitPacket, RayPacket};
 use lightmesh::light_mesh::{DirectMesh, IndirectMesh, MeshPoints, NeededPoints, Neighbours, PointMask};
 use lightmesh::render::{LightMeshes, render_light_mesh};
 use lightmesh::scene::load::LoadedScene;
-use lightmesh::scene::{Camera, SurfacePoint};
+use lightmesh::scene::{Camera, Hit, Ray, SurfacePoint};
 use lightmesh::settings::{IndirectSettings, Leaks, Settings, Spacing};
 
 use crate::common::{backend, bits, camera, forest, surface_point};

@@ -14,7 +14,6 @@ use lightmesh::scene::CameraRays;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::settings::Settings;
-use lightmesh::with_accel;
 use serde_json::Value;
 
 use crate::common::{backend, picture};
@@ -86,7 +85,7 @@ impl Pair {
         let pixels = (0..ours.height()).flat_map(|y| (0..ours.width()).map(move |x| (x, y)));
         pixels
             .map(|(x, y)| {
-                let hit = with_accel!(&backend, accel => accel.intersect(&rays.ray(x, y, 0)))?;
+                let hit = backend.intersect(&rays.ray(x, y, 0))?;
                 let mesh = loaded.scene.instances[hit.instance as usize].mesh;
                 Some(loaded.scene.meshes[mesh as usize].materials.of(hit.triangle))
             })

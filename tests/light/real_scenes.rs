@@ -6,14 +6,13 @@ use std::f32::consts::PI;
 use std::path::Path;
 
 use glam::Vec3;
-use lightmesh::accel::{Accel, Backend, Ray};
+use lightmesh::accel::{Accel, Backend};
 use lightmesh::image::tone::auto_exposure;
 use lightmesh::light_mesh::{DirectMesh, Neighbours};
 use lightmesh::render::Film;
 use lightmesh::scene::load::{LoadedScene, open_scene};
-use lightmesh::scene::{CameraRays, Interaction, PointLight, Scene};
+use lightmesh::scene::{CameraRays, Interaction, PointLight, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
-use lightmesh::with_accel;
 
 use crate::common::{backend, conventional, picture};
 
@@ -102,33 +101,32 @@ fn check_bounds(
     let mesh = DirectMesh::new(scene, &settings.light_mesh).unwrap();
     let mut neighbours = Neighbours::default();
     let (mut checked, mut agreeing) = (0, 0);
-    with_accel!(backend, accel => {
-        let surfaces = visible(accel, loaded);
-        // Every seventh pixel: no divisor of the width, so that all columns have their turn.
-        for (pixel, seen) in surfaces.iter().enumerate().step_by(7) {
-            let Some(seen) = seen else { continue };
-            let y = &seen.point;
-            mesh.points.neighbours(y, &mut neighbours);
-            let sees = |from: Vec3, light: &PointLight| !accel.occluded(&Ray::between(from, light.position));
-            let disagrees = |light: &&PointLight| {
-                let truth = sees(y.ray_origin(), light);
-                neighbours.ids().iter().any(|&id| sees(mesh.points.position(id), light) != truth)
-            };
-            let facing = scene.lights.iter().filter(|light| share(scene, light, seen) != Vec3::ZERO);
-            let bound: Vec3 = facing.filter(disagrees).map(|light| share(scene, light, seen)).sum();
-            checked += 1;
-            agreeing += usize::from(bound == Vec3::ZERO);
-            for channel in 0..3 {
-                let (value, expected) = (film[pixel][channel], exact[pixel][channel]);
-                // The sums over up to hundreds of lights run in different orders.
-                let rounding = 1e-4 * expected.max(value) + 1e-7;
-                assert!(
-                    (value - expected).abs() <= bound[channel] + rounding,
-                    "pixel {pixel}: {value} for {expected}, of which the spacing explains {}", bound[channel]
-                );
-            }
+    let surfaces = visible(backend, loaded);
+    // Every seventh pixel: no divisor of the width, so that all columns have their turn.
+    for (pixel, seen) in surfaces.iter().enumerate().step_by(7) {
+        let Some(seen) = seen else { continue };
+        let y = &seen.point;
+        mesh.points.neighbours(y, &mut neighbours);
+        let sees = |from: Vec3, light: &PointLight| !backend.occluded(&Ray::between(from, light.position));
+        let disagrees = |light: &&PointLight| {
+            let truth = sees(y.ray_origin(), light);
+            neighbours.ids().iter().any(|&id| sees(mesh.points.position(id), light) != truth)
+        };
+        let facing = scene.lights.iter().filter(|light| share(scene, light, seen) != Vec3::ZERO);
+        let bound: Vec3 = facing.filter(disagrees).map(|light| share(scene, light, seen)).sum();
+        checked += 1;
+        agreeing += usize::from(bound == Vec3::ZERO);
+        for channel in 0..3 {
+            let (value, expected) = (film[pixel][channel], exact[pixel][channel]);
+            // The sums over up to hundreds of lights run in different orders.
+            let rounding = 1e-4 * expected.max(value) + 1e-7;
+            assert!(
+                (value - expected).abs() <= bound[channel] + rounding,
+                "pixel {pixel}: {value} for {expected}, of which the spacing explains {}",
+                bound[channel]
+            );
         }
-    });
+    }
     println!("{checked} pixels, in {agreeing} of them all of D_y agrees with y about all lights");
 }
 

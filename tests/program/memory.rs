@@ -4,7 +4,6 @@ use std::process::Command;
 
 use lightmesh::accel::{Accel, Backend, BackendChoice, Footprint, MemoryEstimate};
 use lightmesh::scene::generate::forest::Forest;
-use lightmesh::with_accel;
 
 /// An estimate is of use as long as it isn't exceeded and not far off: by no more than half for a structure of
 /// 100,000 triangles, which is large enough that fixed costs don't count.
@@ -19,7 +18,7 @@ fn estimates_are_near_what_the_structures_take() {
             println!("SKIPPED: no {choice:?} here");
             continue;
         };
-        let bytes = with_accel!(&chosen.backend, accel => accel.memory_bytes()) as u64;
+        let bytes = chosen.backend.memory_bytes() as u64;
         assert!(bytes <= building, "{choice:?}: {bytes}, at most {building} while building");
         assert!(3 * bytes >= 2 * built && 2 * bytes <= 3 * built, "{choice:?}: {bytes}, estimated {built}");
     }

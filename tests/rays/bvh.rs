@@ -9,10 +9,10 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3, Vec3};
 use lightmesh::accel::bvh::{BvhError, SimdLevel};
 use lightmesh::accel::{
-    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, PacketLanes, Ray, RayHitPacket, RayPacket,
+    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, PacketLanes, RayHitPacket, RayPacket,
     hit_of_lane,
 };
-use lightmesh::scene::{Scene, TriangleMaterials, TriangleMesh};
+use lightmesh::scene::{Hit, Ray, Scene, TriangleMaterials, TriangleMesh};
 
 use crate::common::triangles::{self, HOLES, INVISIBLE, Random, mesh, scene};
 
@@ -103,7 +103,7 @@ fn check(scene: &Scene, rays: &[Ray]) {
 }
 
 /// Some lanes of each packet are switched off by a fixed pattern and must stay untouched.
-fn check_packets<const N: usize>(accel: &BvhAccel, rays: &[Ray], expected: &[Option<lightmesh::accel::Hit>]) {
+fn check_packets<const N: usize>(accel: &BvhAccel, rays: &[Ray], expected: &[Option<Hit>]) {
     let context = |lane: usize| format!("{:?}, packet of {N}, lane {lane}", accel.level());
     for (number, (rays, expected)) in rays.chunks(N).zip(expected.chunks(N)).enumerate() {
         let present = (1u32 << rays.len()) - 1;

@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Affine3A, Vec3};
 use lightmesh::accel::{
-    Accel, BruteForceAccel, BvhAccel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket,
+    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket,
 };
 use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
-use lightmesh::scene::{Scene, TriangleMaterials};
+use lightmesh::scene::{Hit, Ray, Scene, TriangleMaterials};
 
 use crate::common::triangles::{RIM, mesh, scene};
 

@@ -7,11 +7,11 @@ use embree_sys::Library;
 use glam::{Affine3A, DMat3, DQuat, DVec3, Mat3, Vec3};
 use lightmesh::{
     accel::{
-        Accel, BruteForceAccel, BvhAccel, Coherence, EmbreeAccel, EmbreeError, Hit, PacketLanes, Ray,
-        RayHitPacket, hit_of_lane,
+        Accel, BruteForceAccel, BvhAccel, Coherence, EmbreeAccel, EmbreeError, PacketLanes, RayHitPacket,
+        hit_of_lane,
     },
     crosscheck::{Judge, Subject, check_rays},
-    scene::{Scene, TriangleMaterials, TriangleMesh},
+    scene::{Hit, Ray, Scene, TriangleMaterials, TriangleMesh},
 };
 
 use crate::common::triangles::{HOLES, INVISIBLE, Random, mesh, scene, soup};

@@ -5,13 +5,12 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
 use lightmesh::accel::{
-    Accel, Backend, BackendChoice, Coherence, INVALID_ID, MAX_COORDINATE, MIN_DIRECTION, PacketLanes, Ray,
+    Accel, Backend, BackendChoice, Coherence, INVALID_ID, MAX_COORDINATE, MIN_DIRECTION, PacketLanes,
     RayHitPacket, hit_of_lane,
 };
 use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::scene::random::SplitMix64;
-use lightmesh::scene::{Scene, TriangleMaterials, TriangleMesh};
-use lightmesh::with_accel;
+use lightmesh::scene::{Ray, Scene, TriangleMaterials, TriangleMesh};
 
 use crate::common::triangles::{HOLES, Random, mesh, scene, soup};
 
@@ -39,14 +38,9 @@ fn backends(scene: &Scene) -> Vec<Backend> {
 
 /// The cross-check of a scene with all backends.
 fn report(scene: &Scene, rays: u64) -> Report {
-    fn subject<'a>(name: &'a str, accel: &'a impl Accel) -> Subject<'a> {
-        Subject { name, accel }
-    }
     let backends = backends(scene);
-    let subjects: Vec<_> = backends
-        .iter()
-        .map(|backend| with_accel!(backend, accel => subject(backend.name(), accel)))
-        .collect();
+    let subjects: Vec<_> =
+        backends.iter().map(|backend| Subject { name: backend.name(), accel: backend }).collect();
     crosscheck(scene, &[], &subjects, &Options { rays, seed: 1 }, &|_| ())
 }
 
@@ -59,20 +53,18 @@ fn assert_clean(name: &str, scene: &Scene) {
 fn hit(scene: &Scene, ray: &Ray) -> Option<(u32, u32)> {
     let mut answers = Vec::new();
     for backend in backends(scene) {
-        with_accel!(&backend, accel => {
-            let single = accel.intersect(ray);
-            let mut packet = RayHitPacket::<8>::empty();
-            packet.set_lane(5, ray);
-            let mut shadow = packet.ray;
-            accel.intersect_packet(1 << 5, &mut packet, Coherence::Coherent);
-            let blocked = accel.occluded_packet(1 << 5, &mut shadow, Coherence::Incoherent);
-            let name = backend.name();
-            assert_eq!(accel.occluded(ray), single.is_some(), "{name}, {ray:?}");
-            assert_eq!(blocked != 0, single.is_some(), "{name}, packet, {ray:?}");
-            assert_eq!(hit_of_lane(&packet, 5).map(|hit| hit.triangle), single.map(|hit| hit.triangle), "{name}");
-            assert!(single.is_none_or(|hit| hit.t.is_finite() && hit.instance != INVALID_ID), "{name}, {ray:?}");
-            answers.push(single.map(|hit| (hit.instance, hit.triangle)));
-        });
+        let single = backend.intersect(ray);
+        let mut packet = RayHitPacket::<8>::empty();
+        packet.set_lane(5, ray);
+        let mut shadow = packet.ray;
+        backend.intersect_packet(1 << 5, &mut packet, Coherence::Coherent);
+        let blocked = backend.occluded_packet(1 << 5, &mut shadow, Coherence::Incoherent);
+        let name = backend.name();
+        assert_eq!(backend.occluded(ray), single.is_some(), "{name}, {ray:?}");
+        assert_eq!(blocked != 0, single.is_some(), "{name}, packet, {ray:?}");
+        assert_eq!(hit_of_lane(&packet, 5).map(|hit| hit.triangle), single.map(|hit| hit.triangle), "{name}");
+        assert!(single.is_none_or(|hit| hit.t.is_finite() && hit.instance != INVALID_ID), "{name}, {ray:?}");
+        answers.push(single.map(|hit| (hit.instance, hit.triangle)));
     }
     assert!(answers.windows(2).all(|pair| pair[0] == pair[1]), "{ray:?}: {answers:?}");
     answers[0]
