@@ -3,8 +3,11 @@
 #![warn(clippy::unwrap_used, clippy::expect_used)]
 
 pub mod accel;
-pub mod bench;
+#[cfg(feature = "cli")]
+mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
 pub mod crosscheck;
 pub mod framing;
 pub mod image;

@@ -11,7 +11,7 @@ mod embree;
 mod memory;
 mod ray;
 
-pub use backend::{Backend, BackendChoice, BackendError, Chosen};
+pub use backend::{Backend, BackendChoice, BackendError, Chosen, UnknownBackend};
 pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]
