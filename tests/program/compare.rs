@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use lightmesh::cli::compare::{CompareArgs, CompareError, Verdict, run};
+use lightmesh::cli::compare::{CompareArgs, run};
+use lightmesh::cli::{CommandError, Outcome as Verdict, describe};
 use lightmesh::image::{Image, ImageOptions, OutputTarget, exr::SampleType};
 
 /// The command line, without the program's own part.
@@ -39,7 +40,7 @@ impl Drop for Scratch {
     }
 }
 
-fn compare(a: &Path, b: &Path, flags: &[&str]) -> (Result<Verdict, CompareError>, String) {
+fn compare(a: &Path, b: &Path, flags: &[&str]) -> (Result<Verdict, CommandError>, String) {
     let paths = [Path::new("compare"), a, b].map(|path| path.to_str().unwrap().to_owned());
     let line = paths.into_iter().chain(flags.iter().map(|flag| (*flag).to_owned()));
     let mut out = Vec::new();
@@ -156,7 +157,7 @@ fn what_cannot_be_compared_is_an_error_that_names_the_file() {
         (scratch.0.clone(), "cannot read"),
     ] {
         let (verdict, out) = compare(&picture, &other, &[]);
-        let message = verdict.unwrap_err().to_string();
+        let message = describe(&verdict.unwrap_err());
         assert!(message.contains(word), "{message}");
         assert_eq!(out, "");
     }

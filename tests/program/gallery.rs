@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use lightmesh::cli::gallery::{Gallery, GalleryArgs, GalleryError, run};
+use lightmesh::cli::gallery::{Gallery, GalleryArgs, run};
+use lightmesh::cli::{CommandError, Outcome, describe};
 use lightmesh::scene::load::load_scene_file;
 
 /// The command line, without the program's own part.
@@ -18,7 +19,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn gallery(arguments: &[&str]) -> Result<(), GalleryError> {
+fn gallery(arguments: &[&str]) -> Result<Outcome, CommandError> {
     run(&Line::parse_from(["gallery", "--quiet"].iter().chain(arguments)).args)
 }
 
@@ -44,7 +45,7 @@ fn the_committed_gallery_is_complete_and_small() {
     let list = Gallery::read(&root().join("scenes/gallery.toml")).unwrap();
     let folder = root().join("docs/gallery");
     let mut total = 0;
-    for picture in &list.picture {
+    for picture in &list.images {
         match picture.missing(&root().join("scenes")) {
             Some(model) => println!("skipped: the scene of {} needs {}", picture.name, model.display()),
             None => drop(load_scene_file(&root().join("scenes").join(&picture.scene)).unwrap()),
@@ -57,7 +58,7 @@ fn the_committed_gallery_is_complete_and_small() {
     for file in fs::read_dir(&folder).unwrap() {
         let path = file.unwrap().path();
         let stem = path.file_stem().unwrap().to_str().unwrap();
-        let known = ["page", "index"].contains(&stem) || list.picture.iter().any(|p| p.name == stem);
+        let known = ["page", "index"].contains(&stem) || list.images.iter().any(|p| p.name == stem);
         assert!(known, "{} belongs to no picture", path.display());
     }
 }
@@ -115,7 +116,7 @@ fn a_list_that_makes_no_sense_is_an_error() {
     let out = folder.path().join("out");
     let failure = |arguments: &[&str]| {
         let message = gallery(&[&["--list", path, "--out", out.to_str().unwrap()], arguments].concat());
-        message.unwrap_err().to_string()
+        describe(&message.unwrap_err())
     };
     assert!(failure(&["--only", "third"]).contains("no picture is named `third`; there are: first, second"));
     let good = fs::read_to_string(&list).unwrap();

@@ -1,4 +1,4 @@
-//! The pages of `lightmesh gallery`: Markdown, and HTML that holds its pictures.
+//! The pages of a gallery: Markdown, and HTML that holds its images.
 
 use std::fmt::Write as _;
 
@@ -6,19 +6,19 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::Value;
 
-use super::gallery::Picture;
+use super::list::ListedImage;
 
-/// A picture with everything that the page tells of it.
+/// An image with everything that the page reports of it.
 pub struct Entry {
     /// Name, title and caption.
-    pub picture: Picture,
+    pub image: ListedImage,
     /// The scene file's path, for display.
     pub scene_path: String,
     /// The scene file.
     pub scene_text: String,
     /// The statistics of the render.
     pub stats: Value,
-    /// The picture.
+    /// The image file.
     pub png: Vec<u8>,
 }
 
@@ -100,11 +100,11 @@ fn plural(count: u64, noun: &str) -> String {
     format!("{} {noun}{}", grouped(count), if count == 1 { "" } else { "s" })
 }
 
-/// The page in Markdown; pictures lie beside it.
+/// The page in Markdown; images lie beside it.
 pub fn markdown(entries: &[Entry]) -> String {
     let mut page = format!("# {TITLE}\n\n{INTRODUCTION}\n");
     for entry in entries {
-        let Picture { name, title, caption, .. } = &entry.picture;
+        let ListedImage { name, title, caption, .. } = &entry.image;
         // Writing to a string cannot fail.
         let _ = write!(
             page,
@@ -119,7 +119,7 @@ pub fn markdown(entries: &[Entry]) -> String {
     page
 }
 
-/// The page in HTML with the pictures inside.
+/// The page in HTML with the images inside.
 pub fn html(entries: &[Entry]) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
@@ -128,7 +128,7 @@ pub fn html(entries: &[Entry]) -> String {
         inline(INTRODUCTION)
     );
     for entry in entries {
-        let Picture { name, title, caption, .. } = &entry.picture;
+        let ListedImage { name, title, caption, .. } = &entry.image;
         let (title, caption) = (inline(title), inline(caption));
         let data = BASE64.encode(&entry.png);
         let _ = write!(
