@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::accel::{Backend, BackendChoice, BackendError};
-use crate::framing::complete_view;
+use crate::framing::choose_view;
 use crate::image::tone::auto_exposure;
 use crate::image::{ImageError, OutputFile};
 use crate::render::render;
-use crate::scene::load::{LoadError, ModelFormat, OpenedScene, complete, load_model};
+use crate::scene::load::{LoadError, ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, LightShape, PointLight};
 use crate::settings::{Integrator, Settings, Spacing};
 
@@ -58,9 +58,9 @@ pub fn run(args: &InitArgs) -> Result<(), InitError> {
     let target = OutputFile::new(&args.output)?;
     let model = load_model(&args.model)?;
     let (has_lights, has_cameras) = (!model.lights.is_empty(), !model.cameras.is_empty());
-    let mut opened = complete(model);
+    let opened = OpenedScene::of_model(model);
     let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene)?.backend;
-    complete_view(&mut opened, &backend);
+    let opened = choose_view(&opened, &backend).complete(opened);
     let exposure = exposure(&opened, &backend);
     let folder = args.output.parent().unwrap_or(Path::new(""));
     let file = relative(&args.model, folder);

@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::progress::Reporter;
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend, BackendChoice, BackendError, MemoryLimitError, check_memory, parse_size};
-use crate::framing::complete_view;
+use crate::framing::choose_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{Image, ImageError, exr::SampleType, tone::auto_exposure};
 use crate::light_mesh::MeshError;
@@ -260,8 +260,8 @@ fn render_to(
     seconds.build = stage.elapsed().as_secs_f64();
 
     let stage = Instant::now();
-    complete_view(&mut opened, &chosen.backend);
-    let OpenedScene { loaded, choices, bare } = opened;
+    let view = choose_view(&opened, &chosen.backend);
+    let OpenedScene { loaded, choices, bare } = view.complete(opened);
     let LoadedScene { scene, cameras, mut settings, .. } = loaded;
     for choice in &choices {
         reporter.line(&format!("note: {choice}"));
