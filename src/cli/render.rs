@@ -10,7 +10,7 @@ use super::overrides::Overrides;
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend};
-use crate::framing::complete_view;
+use crate::framing::choose_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{Image, exr::SampleType, tone::auto_exposure};
 use crate::render::{Film, RenderStats, render};
@@ -82,8 +82,8 @@ fn render_to(
     seconds.build = stage.elapsed().as_secs_f64();
 
     let stage = Instant::now();
-    complete_view(&mut opened, &chosen.backend);
-    let OpenedScene { loaded, choices, bare } = opened;
+    let view = choose_view(&opened, &chosen.backend);
+    let OpenedScene { loaded, choices, bare } = view.complete(opened);
     let LoadedScene { scene, cameras, mut settings, .. } = loaded;
     for choice in &choices {
         reporter.line(&format!("note: {choice}"));

@@ -105,8 +105,9 @@ impl<'a> RaySource<'a> {
         }
         let lights = if scene.lights.is_empty() {
             let mut random = SplitMix64::new(seed);
-            let lights: Vec<_> =
-                (0..20).map(|_| PointLight::new(random.in_box(bounds.min, bounds.max), Vec3::ONE)).collect();
+            let lights: Vec<_> = (0..20)
+                .map(|_| PointLight::point(random.in_box(bounds.min, bounds.max), Vec3::ONE))
+                .collect();
             LightTable::of_scene(&Scene { lights, ..Scene::default() })
         } else {
             LightTable::of_scene(scene)

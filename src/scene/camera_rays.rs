@@ -1,6 +1,6 @@
 //! Camera rays through stratified positions in the pixels.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{Camera, Ray};
 
@@ -22,8 +22,17 @@ impl CameraRays {
     ///
     /// An `up` along the view direction is replaced by some perpendicular, a `look_at` at the eye by −z.
     pub fn new(camera: &Camera, resolution: (u32, u32), samples_per_pixel: u32) -> Self {
-        let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(camera.up).normalize_or(forward.any_orthonormal_vector());
+        let exact = |vector: DVec3| vector.try_normalize().map(|unit| unit.as_vec3());
+        // Squares of very large and very small numbers leave single precision.
+        let forward = (camera.look_at - camera.position)
+            .try_normalize()
+            .or_else(|| exact(camera.look_at.as_dvec3() - camera.position.as_dvec3()))
+            .unwrap_or(Vec3::NEG_Z);
+        let right = forward
+            .cross(camera.up)
+            .try_normalize()
+            .or_else(|| exact(forward.as_dvec3().cross(camera.up.as_dvec3())))
+            .unwrap_or(forward.any_orthonormal_vector());
         let down = forward.cross(right);
         let (width, height) = (resolution.0 as f32, resolution.1 as f32);
         let pixel = 2.0 * (camera.vertical_fov.to_radians() * 0.5).tan() / height;
@@ -81,13 +90,7 @@ mod tests {
     use super::*;
 
     fn camera() -> Camera {
-        Camera {
-            name: String::new(),
-            position: Vec3::new(1.0, 2.0, 3.0),
-            look_at: Vec3::new(1.0, 2.0, -3.0),
-            up: Vec3::Y,
-            vertical_fov: 90.0,
-        }
+        Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, -3.0)).with_fov(90.0)
     }
 
     /// At 90° the image's upper edge is 45° above its middle, and right is right.
@@ -117,6 +120,19 @@ mod tests {
                 seen[(row * columns + column) as usize] += 1;
             }
             assert!(seen.iter().all(|&count| count == 1), "{samples}: {seen:?}");
+        }
+    }
+
+    /// Coordinates whose squares are 0 or infinite in single precision are coordinates like others.
+    #[test]
+    fn the_direction_of_a_view_does_not_depend_on_its_scale() {
+        let direction = |scale: f32| {
+            let camera =
+                Camera { position: camera().position * scale, look_at: camera().look_at * scale, ..camera() };
+            CameraRays::new(&camera.with_up(Vec3::Y * scale), (4, 4), 1).ray(3, 1, 0).direction
+        };
+        for scale in [1e-30, 1e30] {
+            assert!(direction(scale).abs_diff_eq(direction(1.0), 1e-6), "{scale}: {}", direction(scale));
         }
     }
 

@@ -19,12 +19,19 @@ pub struct Material {
     pub two_sided: bool,
     /// Whether camera and reflected rays pass through the back of a one-sided surface.
     pub cull: bool,
-    /// Picture that multiplies k_d.
+    /// Image that multiplies k_d.
     pub diffuse_map: Option<TextureMap>,
-    /// Picture that multiplies Emiss.
+    /// Image that multiplies Emiss.
     pub emission_map: Option<TextureMap>,
     /// Where the surface is opaque; `None` for everywhere.
     pub alpha_mask: Option<AlphaMask>,
+}
+
+impl Material {
+    /// A material that reflects light diffusely.
+    pub fn diffuse(color: Vec3) -> Self {
+        Self { diffuse: color, ..Self::default() }
+    }
 }
 
 impl Default for Material {

@@ -70,6 +70,24 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
+    /// A mesh of triangles given by indices into positions, with material 0 and nothing else.
+    pub fn new(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            name: String::new(),
+            positions: Positions::new(positions),
+            triangles: Arc::new(triangles),
+            normals: None,
+            uvs: None,
+            colors: None,
+            materials: TriangleMaterials::Uniform(0),
+        }
+    }
+
+    /// The mesh with one material for all triangles, an index into [`Scene::materials`](super::Scene::materials).
+    pub fn with_material(self, material: u32) -> Self {
+        Self { materials: TriangleMaterials::Uniform(material), ..self }
+    }
+
     /// The three corners of a triangle in object space.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {

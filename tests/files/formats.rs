@@ -4,7 +4,7 @@ use std::fs;
 
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
-use lightmesh::framing::complete_view;
+use lightmesh::framing::choose_view;
 use lightmesh::render::{Film, render};
 use lightmesh::scene::load::open_scene;
 use lightmesh::scene::random::SplitMix64;
@@ -48,8 +48,7 @@ fn obj_ply_and_gltf_give_the_same_picture() {
         let mut opened = open_scene(&file).unwrap();
         opened.loaded.settings.resolution = (120, 90);
         let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene).unwrap().backend;
-        complete_view(&mut opened, &backend);
-        let loaded = opened.loaded;
+        let loaded = choose_view(&opened, &backend).complete(opened).loaded;
         render(&backend, &loaded.scene, &loaded.cameras[0], &loaded.settings, &()).unwrap().0
     };
     let obj = picture("model.obj", soup.obj().as_bytes());

@@ -40,7 +40,7 @@ fn half_plane() -> Scene {
         ],
         instances: vec![Instance { mesh: 0, to_world: None }, Instance { mesh: 1, to_world: None }],
         materials: vec![Material { diffuse: Vec3::ONE, ..Material::default() }],
-        lights: vec![PointLight::new(LIGHT, Vec3::ONE)],
+        lights: vec![PointLight::point(LIGHT, Vec3::ONE)],
         falloff: Falloff::None,
         background: Vec3::ZERO,
     }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
-use lightmesh::framing::complete_view;
+use lightmesh::framing::choose_view;
 use lightmesh::scene::load::{LoadedScene, OpenedScene, Skipped};
 use lightmesh::scene::{Falloff, LightShape, Material, Scene};
 use lightmesh::settings::Settings;
@@ -24,8 +24,8 @@ fn viewed_with(builder: Builder, material: Material, choice: BackendChoice) -> L
         skipped: Skipped::default(),
         warnings: Vec::new(),
     };
-    let mut opened = OpenedScene { loaded, choices: Vec::new(), bare: true };
-    complete_view(&mut opened, &backend);
+    let opened = OpenedScene { loaded, choices: Vec::new(), bare: true };
+    let opened = choose_view(&opened, &backend).complete(opened);
     assert_eq!(opened.choices.len(), 2, "camera and lights are announced: {:?}", opened.choices);
     opened.loaded
 }

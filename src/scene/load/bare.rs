@@ -1,5 +1,5 @@
 //! A model without a scene file: its settings are chosen. What it lacks of camera and lights,
-//! [`complete_view`](crate::framing::complete_view) chooses.
+//! [`choose_view`](crate::framing::choose_view) chooses.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -30,28 +30,30 @@ pub fn open_scene(path: &Path) -> Result<OpenedScene, LoadError> {
         return Ok(OpenedScene { loaded, choices: Vec::new(), bare: false });
     }
     let model = load_model(path)?;
-    Ok(complete(model))
+    Ok(OpenedScene::of_model(model))
 }
 
-/// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
-pub fn complete(model: Model) -> OpenedScene {
-    let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
-    let scene = Scene {
-        meshes: meshes.into_iter().map(Arc::new).collect(),
-        instances,
-        materials,
-        lights,
-        falloff: Falloff::InverseSquare,
-        background: Vec3::ZERO,
-    };
-    let mut settings = Settings { lambertian: true, ..Settings::default() };
-    let spacing = spacing(scene.bounds(), &scene.lights);
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
-    settings.light_mesh.points.radius = Radius::Spacings(2.0);
-    settings.light_mesh.resolve = Resolve::Trace;
-    let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
-    let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
-    OpenedScene { loaded, choices, bare: true }
+impl OpenedScene {
+    /// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
+    pub fn of_model(model: Model) -> Self {
+        let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
+        let scene = Scene {
+            meshes: meshes.into_iter().map(Arc::new).collect(),
+            instances,
+            materials,
+            lights,
+            falloff: Falloff::InverseSquare,
+            background: Vec3::ZERO,
+        };
+        let mut settings = Settings { lambertian: true, ..Settings::default() };
+        let spacing = spacing(scene.bounds(), &scene.lights);
+        settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
+        settings.light_mesh.points.radius = Radius::Spacings(2.0);
+        settings.light_mesh.resolve = Resolve::Trace;
+        let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
+        let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
+        Self { loaded, choices, bare: true }
+    }
 }
 
 /// Parts of the scene's diagonal between mesh points: at most, without knowledge of the lights, and at least.

@@ -23,7 +23,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-pub use bare::{OpenedScene, complete, open_scene};
+pub use bare::{OpenedScene, open_scene};
 pub use error::{LoadError, Skipped, Warning};
 pub use parts::{MaterialOverride, Selector};
 pub use points::load_points;
