@@ -1,55 +1,26 @@
 //! The choice of a backend at run time.
 
 use std::fmt;
-use std::str::FromStr;
 
 use super::{Accel, BruteForceAccel, BvhAccel, BvhError, Coherence, LaneMask, RayHitPacket, RayPacket};
 #[cfg(feature = "embree")]
 use super::{EmbreeAccel, EmbreeError};
 use crate::scene::{Hit, Ray, Scene};
+use crate::settings::named_enum;
 
-/// What the user asks for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BackendChoice {
-    /// Embree where it is installed, the pure-Rust BVH elsewhere.
-    #[default]
-    Auto,
-    /// Embree; an error where there is none.
-    Embree,
-    /// The pure-Rust BVH.
-    Bvh,
-    /// A loop over all triangles, for tests.
-    BruteForce,
-}
-
-impl BackendChoice {
-    /// The name of each choice, the choice, and what it stands for.
-    pub const NAMES: [(&'static str, Self, &'static str); 4] = [
-        ("auto", Self::Auto, "Embree where it is installed, the pure-Rust BVH elsewhere"),
-        ("embree", Self::Embree, "Embree; an error where there is none"),
-        ("bvh", Self::Bvh, "The pure-Rust BVH"),
-        ("brute-force", Self::BruteForce, "A loop over all triangles, for tests"),
-    ];
-}
-
-impl fmt::Display for BackendChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::NAMES.iter().find(|(_, choice, _)| choice == self);
-        f.write_str(named.map_or("", |(name, ..)| name))
-    }
-}
-
-/// A text that names no backend.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no backend is named `{0}`")]
-pub struct UnknownBackend(pub String);
-
-impl FromStr for BackendChoice {
-    type Err = UnknownBackend;
-
-    fn from_str(text: &str) -> Result<Self, UnknownBackend> {
-        let named = Self::NAMES.iter().find(|(name, ..)| *name == text);
-        named.map(|(_, choice, _)| *choice).ok_or_else(|| UnknownBackend(text.to_owned()))
+named_enum! {
+    /// What the user asks for.
+    #[derive(Default)]
+    pub enum BackendChoice {
+        /// Embree where it is installed, the pure-Rust BVH elsewhere
+        #[default]
+        Auto = "auto",
+        /// Embree; an error where there is none
+        Embree = "embree",
+        /// The pure-Rust BVH
+        Bvh = "bvh",
+        /// A loop over all triangles, for tests
+        BruteForce = "brute-force",
     }
 }
 

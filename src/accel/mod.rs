@@ -13,7 +13,7 @@ mod memory;
 mod packet;
 
 pub(crate) use backend::with_accel;
-pub use backend::{Backend, BackendChoice, BackendError, Chosen, UnknownBackend};
+pub use backend::{Backend, BackendChoice, BackendError, Chosen};
 pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]

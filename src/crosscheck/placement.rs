@@ -3,8 +3,9 @@
 use glam::{Affine3A, DMat3, DVec3};
 
 use super::local_ray::{BOUND, LocalRay};
+use crate::Bounds;
 use crate::accel::largest_coordinate_of;
-use crate::scene::{Bounds, Ray};
+use crate::scene::Ray;
 
 /// Where an instance's triangles are.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::queries::{BLOCK, GROUP, Query, RayQueries, Subject};
-use crate::scene::random::SplitMix64;
+use crate::sampling::SplitMix64;
 use crate::scene::{Ray, Scene};
 
 /// Of this many rays one may escape.
