@@ -15,7 +15,7 @@ use super::{Accel, MAX_COORDINATE, is_valid_ray, largest_coordinate};
 /// boxes, no SIMD and no stack. Its arithmetic is that of the BVH, so that hits must agree to the last bit.
 pub struct BruteForceAccel {
     instances: Vec<Placed>,
-    /// Of the coordinates of rays.
+    /// Largest magnitude of the coordinates of rays that can hit anything.
     largest: f32,
 }
 

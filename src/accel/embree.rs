@@ -27,7 +27,7 @@ pub enum EmbreeError {
     Mesh {
         /// Name of the mesh.
         name: String,
-        /// Why.
+        /// What Embree, or the check before it, refused.
         error: Error,
     },
     /// An instance of a mesh that the scene does not have.

@@ -18,7 +18,7 @@ pub struct BvhAccel {
     pub(super) instances: Instances,
     pub(super) dispatch: Dispatch,
     level: SimdLevel,
-    /// Of the coordinates of rays.
+    /// Largest magnitude of the coordinates of rays that can hit anything.
     pub(super) largest: f32,
 }
 
