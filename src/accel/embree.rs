@@ -180,6 +180,6 @@ impl Accel for EmbreeAccel {
     }
 
     fn memory_bytes(&self) -> usize {
-        self.scene.device().memory_bytes()
+        self.scene.device().memory_bytes() + self.scene.handle_bytes()
     }
 }

@@ -115,7 +115,7 @@ impl Geometry {
     ) -> Result<Self, Error> {
         let mut geometry = Self::new(device, v4::RTC_GEOMETRY_TYPE_INSTANCE)?;
         (geometry.instance, geometry.largest_coordinate) = (true, largest_coordinate);
-        geometry.held.push(scene);
+        geometry.held = vec![scene];
         Ok(geometry)
     }
 
