@@ -39,14 +39,14 @@ pub enum Backend {
     BruteForce(BruteForceAccel),
 }
 
-/// Why no acceleration structure could be had.
+/// Why no acceleration structure could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
-    /// Embree was asked for, and either isn't there or failed.
+    /// Embree was requested, and either isn't there or failed.
     #[cfg(feature = "embree")]
     #[error("backend embree: {0}")]
     Embree(#[from] EmbreeError),
-    /// Embree was asked for from a build without it.
+    /// Embree was requested from a build without it.
     #[cfg(not(feature = "embree"))]
     #[error("backend embree: this build has no Embree support; build with the default features")]
     NoEmbreeSupport,
@@ -83,7 +83,7 @@ impl Backend {
     /// Builds the acceleration structure of a scene.
     ///
     /// # Errors
-    /// Embree asked for by name and not to be had, or a failed build. `auto` falls back only where no Embree
+    /// Embree requested by name and not available, or a failed build. `auto` falls back only where no Embree
     /// library can be used at all; one that fails on this scene is an error.
     pub fn build(choice: BackendChoice, scene: &Scene) -> Result<Chosen, BackendError> {
         let plain = |backend| Ok(Chosen { backend, notice: None });
@@ -115,8 +115,8 @@ impl Backend {
         }
     }
 
-    /// Builds every backend that can be had: the BVH, then Embree in every version that is installed. Where there is
-    /// none, it tells why.
+    /// Builds every backend that is available: the BVH, then Embree in every version that is installed. Where there is
+    /// none, the text is the reason.
     ///
     /// # Errors
     /// As for [`Backend::build`].

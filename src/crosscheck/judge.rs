@@ -58,10 +58,10 @@ pub struct Truth {
 pub struct Judge<'a> {
     scene: &'a Scene,
     placements: Vec<Placement>,
-    /// By mesh.
+    /// Trees of triangles, by mesh.
     trees: Vec<BoxTree>,
     top: BoxTree,
-    /// Of the coordinates of rays.
+    /// Largest magnitude of the coordinates of rays that can hit anything.
     largest: f32,
 }
 

@@ -10,7 +10,7 @@ use crate::scene::Ray;
 /// Where an instance's triangles are.
 #[derive(Clone, Debug)]
 pub enum Placement {
-    /// In world space.
+    /// The mesh is in world space already.
     World,
     /// Moved by a map that can be undone.
     Placed(Box<Inverse>),

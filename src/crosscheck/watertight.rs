@@ -22,7 +22,7 @@ const AIMS: [&str; 3] = ["vertices", "edges", "anywhere"];
 /// Rays that escaped from inside a closed scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Watertightness {
-    /// By backend and aim.
+    /// Counts by backend and aim.
     pub rows: Vec<Escapes>,
 }
 
