@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde_json::{Map, Value, json};
 
-use crate::image::error_picture::error_picture;
+use crate::image::error_image::error_image;
 use crate::image::metrics::{self, Metrics, MetricsError, MetricsOptions};
 use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
 
@@ -200,7 +200,7 @@ pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Verdict, CompareEr
     let metrics = metrics::compare(&picture, &reference, options).map_err(incomparable)?;
 
     if let Some(target) = error_target {
-        let colours = error_picture(&picture, &reference, args.error_scale).map_err(incomparable)?;
+        let colours = error_image(&picture, &reference, args.error_scale).map_err(incomparable)?;
         let scale =
             format!("mean of |A - B| over the channels; magma from 0 to {} of B's mean", args.error_scale);
         let metadata = [("Description".to_owned(), scale)];

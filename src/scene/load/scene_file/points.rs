@@ -9,7 +9,8 @@ use toml::Spanned;
 use super::place::Places;
 use super::values::{Lengths, LengthsOrAuto, Point, Positive};
 use crate::scene::Bounds;
-use crate::scene::load::{LoadError, load_points};
+use crate::scene::load::LoadError;
+use crate::scene::load::points::load_points;
 use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing};
 
 /// Defines a table that has the point keys beside its own. (serde can't flatten a struct into one that
