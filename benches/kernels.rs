@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use divan::{Bencher, black_box};
 use glam::{Vec3, Vec4};
-use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayPacket};
+use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, RayPacket};
 use lightmesh::light_mesh::{
     Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
     Scratch, directional,
 };
 use lightmesh::scene::random::SplitMix64;
 use lightmesh::scene::{
-    Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials,
+    Instance, LightShape, Material, PointLight, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
     TriangleMesh,
 };
 use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};

@@ -3,9 +3,12 @@
 #![warn(clippy::unwrap_used, clippy::expect_used)]
 
 pub mod accel;
-pub mod bench;
+#[cfg(feature = "cli")]
+mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
 mod color;
+#[cfg(feature = "cli")]
 pub mod crosscheck;
 pub mod framing;
 pub mod image;

@@ -9,6 +9,9 @@ use glam::Vec3;
 
 use crate::scene::Bounds;
 
+/// The range of exposures in stops: from −`MAX_EXPOSURE` to `MAX_EXPOSURE`.
+pub const MAX_EXPOSURE: f32 = 100.0;
+
 /// Settings of one render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -24,7 +27,7 @@ pub struct Settings {
     pub max_depth: u32,
     /// A path ends where its weight (the product of the k_s so far) falls below this in all channels.
     pub weight_threshold: f32,
-    /// Exposure of tone-mapped pictures, in stops.
+    /// Exposure of tone-mapped pictures in stops, at most [`MAX_EXPOSURE`] either way.
     pub exposure: f32,
     /// Samples per image block, which bounds the memory for camera paths and never changes the picture;
     /// `None` for a good default.

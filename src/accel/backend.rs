@@ -1,14 +1,15 @@
 //! The choice of a backend at run time.
 
 use std::fmt;
+use std::str::FromStr;
 
-use super::{BruteForceAccel, BvhAccel, BvhError};
+use super::{Accel, BruteForceAccel, BvhAccel, BvhError, Coherence, LaneMask, RayHitPacket, RayPacket};
 #[cfg(feature = "embree")]
 use super::{EmbreeAccel, EmbreeError};
-use crate::scene::Scene;
+use crate::scene::{Hit, Ray, Scene};
 
 /// What the user asks for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BackendChoice {
     /// Embree where it is installed, the pure-Rust BVH elsewhere.
     #[default]
@@ -21,7 +22,42 @@ pub enum BackendChoice {
     BruteForce,
 }
 
+impl BackendChoice {
+    /// The name of each choice, the choice, and what it stands for.
+    pub const NAMES: [(&'static str, Self, &'static str); 4] = [
+        ("auto", Self::Auto, "Embree where it is installed, the pure-Rust BVH elsewhere"),
+        ("embree", Self::Embree, "Embree; an error where there is none"),
+        ("bvh", Self::Bvh, "The pure-Rust BVH"),
+        ("brute-force", Self::BruteForce, "A loop over all triangles, for tests"),
+    ];
+}
+
+impl fmt::Display for BackendChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::NAMES.iter().find(|(_, choice, _)| choice == self);
+        f.write_str(named.map_or("", |(name, ..)| name))
+    }
+}
+
+/// A text that names no backend.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no backend is named `{0}`")]
+pub struct UnknownBackend(pub String);
+
+impl FromStr for BackendChoice {
+    type Err = UnknownBackend;
+
+    fn from_str(text: &str) -> Result<Self, UnknownBackend> {
+        let named = Self::NAMES.iter().find(|(name, ..)| *name == text);
+        named.map(|(_, choice, _)| *choice).ok_or_else(|| UnknownBackend(text.to_owned()))
+    }
+}
+
 /// An acceleration structure of one of the backends.
+///
+/// A `Backend` is an [`Accel`] that looks up its variant in every call. That takes little beside tracing a ray, but keeps
+/// queries from being inlined. Code that traces a few rays takes a `Backend`; a loop over millions of rays is generic over
+/// [`Accel`] and is called with the variant's own structure, which [`render`](crate::render) looks up once.
 pub enum Backend {
     /// Debian's Embree.
     #[cfg(feature = "embree")]
@@ -49,7 +85,6 @@ pub enum BackendError {
 }
 
 /// Runs `$body` with `$accel` bound to the backend's own type, so that everything within is dispatched statically.
-#[macro_export]
 macro_rules! with_accel {
     ($backend:expr, $accel:ident => $body:expr) => {
         match $backend {
@@ -63,6 +98,7 @@ macro_rules! with_accel {
         }
     };
 }
+pub(crate) use with_accel;
 
 /// A backend, and what the user should know about the choice.
 pub struct Chosen {
@@ -143,6 +179,42 @@ impl Backend {
             Self::Embree(accel) => accel.version(),
             _ => env!("CARGO_PKG_VERSION").to_owned(),
         }
+    }
+}
+
+impl Accel for Backend {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        with_accel!(self, accel => accel.intersect(ray))
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        with_accel!(self, accel => accel.occluded(ray))
+    }
+
+    #[inline]
+    fn intersect_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayHitPacket<N>,
+        coherence: Coherence,
+    ) {
+        with_accel!(self, accel => accel.intersect_packet(active, packet, coherence));
+    }
+
+    #[inline]
+    fn occluded_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayPacket<N>,
+        coherence: Coherence,
+    ) -> LaneMask {
+        with_accel!(self, accel => accel.occluded_packet(active, packet, coherence))
+    }
+
+    fn memory_bytes(&self) -> usize {
+        with_accel!(self, accel => accel.memory_bytes())
     }
 }
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use crate::scene::{AlphaMasks, MaskedMesh, Scene, TriangleMesh};
+use crate::scene::{AlphaMasks, Hit, MaskedMesh, Ray, Scene, TriangleMesh};
 
 use super::bvh::WorldToObject;
 use super::{
-    Accel, Coherence, Hit, INVALID_ID, LaneMask, MAX_COORDINATE, Ray, RayHitPacket, RayPacket,
+    Accel, Coherence, INVALID_ID, LaneMask, MAX_COORDINATE, RayHitPacket, RayPacket, is_valid_ray,
     largest_coordinate,
 };
 
@@ -56,7 +56,7 @@ impl BruteForceAccel {
 
     /// Calls `found` with every hit; stops when that returns true.
     fn each_hit(&self, ray: &Ray, mut found: impl FnMut(Hit) -> bool) {
-        if !ray.is_valid(self.largest) {
+        if !is_valid_ray(ray, self.largest) {
             return;
         }
         for (instance, Placed { mesh, masked, placement }) in self.instances.iter().enumerate() {

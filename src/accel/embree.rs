@@ -6,9 +6,9 @@ use std::sync::Arc;
 use embree_sys::{Device, Error, Geometry, Library, Opacity, SceneBuilder};
 use thiserror::Error as ThisError;
 
-use super::ray::columns;
-use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
-use crate::scene::{AlphaMasks, Scene, TriangleMesh};
+use super::limits::columns;
+use super::{Accel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket};
+use crate::scene::{AlphaMasks, Hit, Ray, Scene, TriangleMesh};
 
 /// What keeps Embree from being used.
 #[derive(Clone, Debug, ThisError)]

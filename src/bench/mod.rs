@@ -17,14 +17,14 @@ mod shading;
 mod threads;
 mod timing;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
 pub use html::to_html;
-pub use machine::Machine;
-pub use report::{Aim, Goal, Measurement, Plot, Report, Series, Table};
-pub use timing::{Budget, Samples};
+pub use report::Report;
 
+use self::timing::Budget;
 use crate::accel::{BackendChoice, BackendError};
 use crate::image::ImageError;
 use crate::light_mesh::MeshError;
@@ -32,17 +32,38 @@ use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
 
 /// What can be measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Benchmark {
-    /// The paper's comparison: a forest by light mesh and by conventional tracing
+    /// The paper's comparison: a forest by light mesh and by conventional tracing.
     #[default]
     Headline,
-    /// Time over resolution, lights, triangles, spacing and threads
+    /// Time over resolution, lights, triangles, spacing and threads.
     Scaling,
-    /// Rays per second of the backends, by kind of ray and packet width
+    /// Rays per second of the backends, by kind of ray and packet width.
     Backends,
-    /// Evaluation of mesh points against a loop that only traces the same rays
+    /// Evaluation of mesh points against a loop that only traces the same rays.
     Rays,
+}
+
+impl Benchmark {
+    /// The name of each benchmark, the benchmark, and what it measures.
+    pub const NAMES: [(&'static str, Self, &'static str); 4] = [
+        (
+            "headline",
+            Self::Headline,
+            "The paper's comparison: a forest by light mesh and by conventional tracing",
+        ),
+        ("scaling", Self::Scaling, "Time over resolution, lights, triangles, spacing and threads"),
+        ("backends", Self::Backends, "Rays per second of the backends, by kind of ray and packet width"),
+        ("rays", Self::Rays, "Evaluation of mesh points against a loop that only traces the same rays"),
+    ];
+}
+
+impl fmt::Display for Benchmark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::NAMES.iter().find(|(_, benchmark, _)| benchmark == self);
+        f.write_str(named.map_or("", |(name, ..)| name))
+    }
 }
 
 /// How to measure.

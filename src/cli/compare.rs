@@ -1,4 +1,4 @@
-//! `lightmesh compare`: how far a picture is from a reference.
+//! `lightmesh compare`: how far an image is from a reference.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -6,50 +6,52 @@ use std::str::FromStr;
 
 use serde_json::{Map, Value, json};
 
+use super::error::{CommandError, Outcome};
+use super::parse::{self, non_negative, positive};
 use crate::image::error_image::error_image;
-use crate::image::metrics::{self, Metrics, MetricsError, MetricsOptions};
+use crate::image::metrics::{self, Metrics, MetricsOptions};
 use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
 
-/// Compare a picture with a reference.
+/// What `compare` takes.
 ///
-/// Both may be EXR or PNG. Prints one line per number, or JSON. Ends with 0, or with 1 if a number is above a
+/// Both images may be EXR or PNG. Prints one line per number, or JSON. Ends with 0, or with 1 if a number is above a
 /// limit, a pixel is not finite, or something failed.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CompareArgs {
-    /// The picture
+    /// The image
     #[arg(value_name = "A")]
-    pub image: PathBuf,
+    image: PathBuf,
 
     /// The reference
     #[arg(value_name = "B")]
-    pub reference: PathBuf,
+    reference: PathBuf,
 
     /// Write a PNG of the errors in false colours: black for none, light yellow for full scale, green for pixels
     /// that are not finite
-    #[arg(long, value_name = "F.png")]
-    pub error_picture: Option<PathBuf>,
+    #[arg(long, value_name = "F.png", alias = "error-picture")]
+    error_image: Option<PathBuf>,
 
-    /// Error at full scale of the error picture, as a share of the reference's mean
-    #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = positive)]
-    pub error_scale: f64,
+    /// Error at full scale of the error image, as a share of the reference's mean
+    #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = positive::<f64>)]
+    error_scale: f64,
 
     /// Fail if a number is above a limit: a number for relative_rmse, or METRIC=NUMBER with rmse, relative_rmse,
     /// mean_relative_error, block_mean_relative_error, flip, max_abs or differing_pixels; may be repeated
     #[arg(long, value_name = "[METRIC=]NUMBER")]
-    pub fail_above: Vec<Limit>,
+    fail_above: Vec<Limit>,
 
     /// Count a pixel as differing only if a channel differs by more than this share of the reference's mean
     /// [default: any bit]
-    #[arg(long, value_name = "SHARE", value_parser = non_negative)]
-    pub differ_above: Option<f64>,
+    #[arg(long, value_name = "SHARE", value_parser = non_negative::<f64>)]
+    differ_above: Option<f64>,
 
     /// Exposure in stops of the tone mapping before PSNR and FLIP
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = stops)]
-    pub exposure: f32,
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse::exposure)]
+    exposure: f32,
 
-    /// Print JSON; numbers that are not defined, such as the PSNR of equal pictures, are null
+    /// Print JSON; numbers that are not defined, such as the PSNR of equal images, are null
     #[arg(long)]
-    pub json: bool,
+    json: bool,
 }
 
 /// A number whose exceeding fails the comparison.
@@ -121,91 +123,39 @@ impl FromStr for Limit {
     }
 }
 
-fn number(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| "not a number".to_owned())
-}
-
-fn non_negative(text: &str) -> Result<f64, String> {
-    number(text)
-        .and_then(|value| if value >= 0.0 { Ok(value) } else { Err("must not be negative".to_owned()) })
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    number(text).and_then(|value| if value > 0.0 { Ok(value) } else { Err("must be above 0".to_owned()) })
-}
-
-fn stops(text: &str) -> Result<f32, String> {
-    number(text).and_then(|value| {
-        if value.abs() <= 100.0 { Ok(value as f32) } else { Err("must be between -100 and 100".to_owned()) }
-    })
-}
-
-/// How a comparison ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// All numbers are within their limits and all pixels are finite.
-    Passed,
-    /// A number is above its limit or not defined, or a pixel is not finite.
-    Failed,
-}
-
-/// A comparison that could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    /// A picture could not be read or written.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The pictures cannot be compared.
-    #[error("{} and {}: {source}", image.display(), reference.display())]
-    Metrics {
-        /// The picture.
-        image: PathBuf,
-        /// The reference.
-        reference: PathBuf,
-        /// Why not.
-        source: MetricsError,
-    },
-    /// The error picture's name has another extension than .png.
-    #[error("{}: an error picture is a .png", .0.display())]
-    ErrorPictureFormat(PathBuf),
-    /// The result could not be printed.
-    #[error("cannot print the result: {0}")]
-    Print(#[from] std::io::Error),
-}
-
-/// Compares two pictures and prints the result to `out`.
+/// Compares two images and prints the result to `out`.
 ///
 /// # Errors
 ///
-/// If a file cannot be read or written, or the pictures differ in size; then nothing is printed.
-pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Verdict, CompareError> {
-    let error_target = match &args.error_picture {
+/// If a file cannot be read or written, or the images differ in size; then nothing is printed.
+pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
+    let error_target = match &args.error_image {
         Some(path) => {
             let target = OutputTarget::new(path)?;
             if target.format() != ImageFormat::Png {
-                return Err(CompareError::ErrorPictureFormat(path.clone()));
+                return Err(CommandError::ErrorImageFormat(path.clone()));
             }
             Some(target)
         }
         None => None,
     };
-    let picture = image::read(&args.image)?;
+    let image = image::read(&args.image)?;
     let reference = image::read(&args.reference)?;
-    let incomparable = |source| CompareError::Metrics {
+    let incomparable = |source| CommandError::Incomparable {
         image: args.image.clone(),
         reference: args.reference.clone(),
         source,
     };
     let options = MetricsOptions { exposure: args.exposure, threshold: args.differ_above };
-    let metrics = metrics::compare(&picture, &reference, options).map_err(incomparable)?;
+    let metrics = metrics::compare(&image, &reference, options).map_err(incomparable)?;
 
     if let Some(target) = error_target {
-        let colours = error_image(&picture, &reference, args.error_scale).map_err(incomparable)?;
+        let colours = error_image(&image, &reference, args.error_scale).map_err(incomparable)?;
         let scale =
             format!("mean of |A - B| over the channels; magma from 0 to {} of B's mean", args.error_scale);
         let metadata = [("Description".to_owned(), scale)];
         let bytes =
-            png::encode_rgb8(picture.width(), picture.height(), &colours, &metadata).map_err(|error| {
+            png::encode_rgb8(image.width(), image.height(), &colours, &metadata).map_err(|error| {
                 ImageError::Encode { path: target.path().to_path_buf(), cause: error.to_string() }
             })?;
         target.file().write(&bytes)?;
@@ -213,9 +163,9 @@ pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Verdict, CompareEr
 
     let exceeded: Vec<&Limit> = args.fail_above.iter().filter(|limit| limit.exceeded_by(&metrics)).collect();
     let not_finite = metrics.non_finite_pixels + metrics.reference_non_finite_pixels;
-    let verdict = if exceeded.is_empty() && not_finite == 0 { Verdict::Passed } else { Verdict::Failed };
+    let outcome = Outcome::of(exceeded.is_empty() && not_finite == 0);
 
-    let fields = fields(&picture, &metrics);
+    let fields = fields(&image, &metrics);
     if args.json {
         let object: Map<String, Value> =
             fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
@@ -232,7 +182,7 @@ pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Verdict, CompareEr
             writeln!(out, "pixels that are not finite were left out of the numbers above")?;
         }
     }
-    Ok(verdict)
+    Ok(outcome)
 }
 
 impl Limit {

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::error::{CommandError, Outcome};
 use crate::scene::generate::forest::Forest;
 use crate::scene::generate::interior::Interior;
-use crate::scene::generate::{GenerateError, still_life};
+use crate::scene::generate::still_life;
 
-/// Write a scene made by rule
+/// What `generate` takes.
 #[derive(Args, Clone, Debug)]
 pub struct GenerateArgs {
     /// What to generate.
     #[command(subcommand)]
-    pub scene: GeneratedScene,
+    scene: GeneratedScene,
 }
 
 /// What can be generated.
@@ -33,17 +34,17 @@ pub struct ForestArgs {
     /// Number of triangles, exactly
     #[arg(long, value_name = "N", default_value_t = 23_542,
           value_parser = clap::value_parser!(u32).range(i64::from(Forest::TRIANGLES.0)..=i64::from(Forest::TRIANGLES.1)))]
-    pub triangles: u32,
+    triangles: u32,
     /// Number of point lights
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u32).range(i64::from(Forest::LIGHTS.0)..=i64::from(Forest::LIGHTS.1)))]
-    pub lights: u32,
+    lights: u32,
     /// Seed of everything random
     #[arg(long, default_value_t = 1)]
-    pub seed: u32,
+    seed: u32,
     /// Folder to write into, created if need be
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    output: PathBuf,
 }
 
 /// Arguments of `lightmesh generate interior`.
@@ -52,14 +53,14 @@ pub struct InteriorArgs {
     /// Number of pairs of columns along the hall
     #[arg(long, value_name = "N", default_value_t = 6,
           value_parser = clap::value_parser!(u32).range(i64::from(Interior::BAYS.0)..=i64::from(Interior::BAYS.1)))]
-    pub bays: u32,
+    bays: u32,
     /// Number of lamps per pair of columns
     #[arg(long, value_name = "N", default_value_t = 40,
           value_parser = clap::value_parser!(u32).range(i64::from(Interior::LAMPS.0)..=i64::from(Interior::LAMPS.1)))]
-    pub lamps: u32,
+    lamps: u32,
     /// Folder to write into, created if need be
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    output: PathBuf,
 }
 
 /// Arguments of `lightmesh generate still-life`.
@@ -67,21 +68,22 @@ pub struct InteriorArgs {
 pub struct StillLifeArgs {
     /// Folder to write into, created if need be
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    output: PathBuf,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// [`GenerateError`]; then nothing is written.
-pub fn run(args: &GenerateArgs) -> Result<(), GenerateError> {
+/// [`CommandError::Generate`]; then nothing is written.
+pub fn run(args: &GenerateArgs) -> Result<Outcome, CommandError> {
     match &args.scene {
         GeneratedScene::Forest(ForestArgs { triangles, lights, seed, output }) => {
-            Forest { triangles: *triangles, lights: *lights, seed: *seed }.write(output)
+            Forest { triangles: *triangles, lights: *lights, seed: *seed }.write(output)?;
         }
         GeneratedScene::Interior(InteriorArgs { bays, lamps, output }) => {
-            Interior { bays: *bays, lamps: *lamps }.write(output)
+            Interior { bays: *bays, lamps: *lamps }.write(output)?;
         }
-        GeneratedScene::StillLife(StillLifeArgs { output }) => still_life::write(output),
+        GeneratedScene::StillLife(StillLifeArgs { output }) => still_life::write(output)?,
     }
+    Ok(Outcome::Passed)
 }

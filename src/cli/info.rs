@@ -1,34 +1,26 @@
 //! `lightmesh info`: what a file holds.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::error::{CommandError, Outcome};
+use super::shared::{QuietArgs, SceneArgs};
 use crate::accel::{Footprint, MemoryEstimate};
 use crate::scene::LightShape;
-use crate::scene::load::{LoadError, OpenedScene, open_scene};
+use crate::scene::load::OpenedScene;
 
 /// What `info` takes.
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// Scene file (TOML) or model (.glb, .gltf, .obj, .ply)
-    pub file: PathBuf,
+    #[command(flatten)]
+    scene: SceneArgs,
     /// Print JSON
     #[arg(long)]
-    pub json: bool,
-}
-
-/// Why nothing was told.
-#[derive(Debug, thiserror::Error)]
-pub enum InfoError {
-    /// The file can't be read.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The answer can't be written.
-    #[error(transparent)]
-    Output(#[from] io::Error),
+    json: bool,
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
 #[derive(Serialize)]
@@ -84,7 +76,7 @@ impl Info {
         }
     }
 
-    fn print(&self, out: &mut impl Write) -> io::Result<()> {
+    fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         let mega = |bytes: u64| bytes as f64 / 1e6;
         writeln!(out, "triangles  {} ({} unique)", self.triangles, self.unique_triangles)?;
         writeln!(out, "meshes     {}, placed {} times", self.meshes, self.instances)?;
@@ -117,13 +109,13 @@ impl Info {
 /// Prints what a file holds.
 ///
 /// # Errors
-/// See [`InfoError`].
-pub fn run(args: &InfoArgs, out: &mut impl Write) -> Result<(), InfoError> {
-    let info = Info::new(&open_scene(&args.file)?);
+/// See [`CommandError`].
+pub fn run(args: &InfoArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
+    let info = Info::new(&args.scene.read(&args.quiet.reporter())?);
     if args.json {
         writeln!(out, "{}", serde_json::json!(info))?;
     } else {
         info.print(out)?;
     }
-    Ok(())
+    Ok(Outcome::Passed)
 }

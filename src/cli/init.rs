@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::accel::{Backend, BackendChoice, BackendError};
+use super::error::{CommandError, Outcome};
+use super::shared::{QuietArgs, report_doubts};
+use crate::accel::{Backend, BackendChoice};
 use crate::framing::choose_view;
+use crate::image::OutputFile;
 use crate::image::tone::auto_exposure;
-use crate::image::{ImageError, OutputFile};
 use crate::render::render;
-use crate::scene::load::{LoadError, ModelFormat, OpenedScene, load_model};
+use crate::scene::load::{ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, LightShape, PointLight};
 use crate::settings::{Integrator, Settings, Spacing};
 
@@ -18,58 +20,48 @@ use crate::settings::{Integrator, Settings, Spacing};
 #[derive(Args, Debug)]
 pub struct InitArgs {
     /// Model (.glb, .gltf, .obj, .ply)
-    pub model: PathBuf,
+    model: PathBuf,
     /// Scene file to write
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    output: PathBuf,
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
-/// Why nothing was written.
-#[derive(Debug, thiserror::Error)]
-pub enum InitError {
-    /// The model can't be read.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The scene file can't be written.
-    #[error(transparent)]
-    Write(#[from] ImageError),
-    /// No backend.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
-    /// The model is a scene file already.
-    #[error("{}: is not a model (known: .glb, .gltf, .obj, .ply)", .0.display())]
-    NoModel(PathBuf),
-    /// The names can't be put into TOML.
-    #[error("{}: the name is not UTF-8", .0.display())]
-    Name(PathBuf),
-}
-
-/// Size of the picture that the exposure is taken from.
+/// Size of the image that the exposure is taken from.
 const PREVIEW: (u32, u32) = (96, 72);
 
 /// Writes the scene file.
 ///
 /// # Errors
-/// See [`InitError`]; then no file has changed.
-pub fn run(args: &InitArgs) -> Result<(), InitError> {
+/// See [`CommandError`]; then no file has changed.
+pub fn run(args: &InitArgs) -> Result<Outcome, CommandError> {
     if ModelFormat::of(&args.model).is_none() {
-        return Err(InitError::NoModel(args.model.clone()));
+        return Err(CommandError::NotAModel(args.model.clone()));
     }
     let target = OutputFile::new(&args.output)?;
-    let model = load_model(&args.model)?;
+    let reporter = args.quiet.reporter();
+    let spinner = reporter.spinner("reading");
+    let model = load_model(&args.model);
+    spinner.finish_and_clear();
+    let model = model?;
     let (has_lights, has_cameras) = (!model.lights.is_empty(), !model.cameras.is_empty());
     let opened = OpenedScene::of_model(model);
+    report_doubts(&opened.loaded, &args.model, &reporter);
+    let spinner = reporter.spinner("choosing");
     let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene)?.backend;
     let opened = choose_view(&opened, &backend).complete(opened);
     let exposure = exposure(&opened, &backend);
+    spinner.finish_and_clear();
     let folder = args.output.parent().unwrap_or(Path::new(""));
     let file = relative(&args.model, folder);
-    let file = file.to_str().ok_or_else(|| InitError::Name(args.model.clone()))?;
+    let file = file.to_str().ok_or_else(|| CommandError::Name(args.model.clone()))?;
     let text = scene_file(&opened, file, exposure, has_lights, has_cameras);
-    Ok(target.write(text.as_bytes())?)
+    target.write(text.as_bytes())?;
+    Ok(Outcome::Passed)
 }
 
-/// Exposure by a small picture.
+/// Exposure by a small image.
 fn exposure(opened: &OpenedScene, backend: &Backend) -> f32 {
     let loaded = &opened.loaded;
     let settings =
@@ -122,7 +114,7 @@ fn scene_file(
     line("\n[render]".to_owned());
     line(format!("resolution = [{width}, {height}]"));
     line("lambertian = true".to_owned());
-    line("# Stops; each doubles the brightness of PNG pictures.".to_owned());
+    line("# Stops; each doubles the brightness of PNG images.".to_owned());
     line(format!("exposure = {exposure:?}"));
     line("\n[light_mesh]".to_owned());
     if let Spacing::Units(spacing) = loaded.settings.light_mesh.points.spacing {
@@ -142,7 +134,7 @@ fn scene_file(
         loaded.scene.lights.iter().for_each(|light| line(light_table(light)));
     }
     if loaded.scene.materials.iter().any(|material| material.cull) {
-        line("\n# The rooms are shown cut open: rays of sight pass through the backs of walls.".to_owned());
+        line("\n# The rooms are shown cut open: camera rays pass through the backs of walls.".to_owned());
         line("[[material]]\ncull = true".to_owned());
     }
     text

@@ -1,21 +1,27 @@
 //! The program's command line: one file per subcommand.
 
-pub mod bench;
+mod bench;
+mod choice;
 pub mod compare;
-pub mod crosscheck;
+mod crosscheck;
+mod error;
 pub mod gallery;
-mod gallery_page;
-pub mod generate;
-pub mod info;
-pub mod init;
+mod generate;
+mod info;
+mod init;
+mod overrides;
+mod parse;
 mod progress;
-pub mod render;
+mod render;
+mod shared;
 mod stats_file;
 
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+pub use error::{CommandError, Outcome, describe};
 
 /// Renders large triangle scenes with many lights by light meshes.
 #[derive(Debug, Parser)]
@@ -27,9 +33,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene file to a picture.
+    /// Render a scene file to an image.
     Render(Box<render::RenderArgs>),
-    /// Tell what a scene file or model holds.
+    /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
     Init(init::InitArgs),
@@ -41,8 +47,23 @@ enum Command {
     Crosscheck(crosscheck::CrosscheckArgs),
     /// Render the scenes of a list and write a page about them.
     Gallery(gallery::GalleryArgs),
-    /// Measure how far a picture is from a reference.
+    /// Measure how far an image is from a reference.
     Compare(compare::CompareArgs),
+}
+
+impl Command {
+    fn run(&self, out: &mut dyn Write) -> Result<Outcome, CommandError> {
+        match self {
+            Self::Render(args) => render::run(args),
+            Self::Info(args) => info::run(args, out),
+            Self::Init(args) => init::run(args),
+            Self::Generate(args) => generate::run(args),
+            Self::Bench(args) => bench::run(args, out),
+            Self::Crosscheck(args) => crosscheck::run(args, out),
+            Self::Gallery(args) => gallery::run(args),
+            Self::Compare(args) => compare::run(args, out),
+        }
+    }
 }
 
 /// Exit code of wrong usage; clap's own.
@@ -60,53 +81,73 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { USAGE } else { 0 });
         }
     };
-    let mut out = io::stdout().lock();
-    let result = match &cli.command {
-        Command::Render(args) => render::run(args).map_err(anything),
-        Command::Info(args) => match info::run(args, &mut out) {
-            Ok(()) => Ok(()),
-            Err(info::InfoError::Output(error)) => Err(anything(error)),
-            Err(error) => Err(anything(error)),
-        },
-        Command::Init(args) => init::run(args).map_err(anything),
-        Command::Generate(args) => generate::run(args).map_err(anything),
-        Command::Bench(args) => match bench::run(args, &mut out) {
-            Err(bench::BenchCommandError::Print(error)) => Err(anything(error)),
-            result => result.map_err(anything),
-        },
-        Command::Crosscheck(args) => match crosscheck::run(args, &mut out) {
-            Ok(crosscheck::Verdict::Passed) => Ok(()),
-            Ok(crosscheck::Verdict::Failed) => {
-                // What could not be told makes no difference to the verdict.
-                let _ = out.flush();
-                return ExitCode::FAILURE;
-            }
-            Err(crosscheck::CrosscheckError::Print(error)) => Err(anything(error)),
-            Err(error) => Err(anything(error)),
-        },
-        Command::Gallery(args) => gallery::run(args).map_err(anything),
-        Command::Compare(args) => match compare::run(args, &mut out) {
-            Ok(compare::Verdict::Passed) => Ok(()),
-            Ok(compare::Verdict::Failed) => return ExitCode::FAILURE,
-            Err(compare::CompareError::Print(error)) => Err(Box::new(error) as Box<dyn std::error::Error>),
-            Err(error) => Err(anything(error)),
-        },
-    };
-    match result.and_then(|()| out.flush().map_err(anything)) {
-        Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads the output has seen enough.
-        Err(error) if is_broken_pipe(&*error) => ExitCode::SUCCESS,
+    let mut out = Output(io::stdout().lock());
+    let result = cli.command.run(&mut out).and_then(|outcome| {
+        out.flush()?;
+        Ok(outcome)
+    });
+    match result {
+        Ok(outcome) => outcome.into(),
         Err(error) => {
-            let _ = writeln!(io::stderr(), "lightmesh: {error}");
+            let _ = writeln!(io::stderr(), "lightmesh: {}", describe(&error));
             ExitCode::FAILURE
         }
     }
 }
 
-fn anything(error: impl std::error::Error + 'static) -> Box<dyn std::error::Error> {
-    Box::new(error)
+/// Standard output. A reader that closes it has seen enough: what is written from then on is dropped, which is no
+/// error and changes no outcome.
+struct Output<W>(W);
+
+impl<W: Write> Write for Output<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        unless_closed(self.0.write(bytes), bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        unless_closed(self.0.flush(), ())
+    }
 }
 
-fn is_broken_pipe(error: &(dyn std::error::Error + 'static)) -> bool {
-    error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
+/// The result, or `dropped` if the reader has gone.
+fn unless_closed<T>(result: io::Result<T>, dropped: T) -> io::Result<T> {
+    match result {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(dropped),
+        result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    /// Clap's own checks: no flag is declared twice, defaults can be parsed.
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    /// A writer that fails in one way.
+    struct Failing(ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Err(self.0.into())
+        }
+    }
+
+    /// A result that was computed is not lost because the reader has gone; a full disk is an error all the same.
+    #[test]
+    fn only_a_closed_pipe_is_forgiven() {
+        let mut closed = Output(Failing(ErrorKind::BrokenPipe));
+        assert!(closed.write_all(b"result").is_ok() && closed.flush().is_ok());
+        let mut full = Output(Failing(ErrorKind::StorageFull));
+        assert!(full.write_all(b"result").is_err() && full.flush().is_err());
+    }
 }

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::render::Progress;
 
-/// Speaks to the user on stderr: notices always unless quiet, progress bars on a terminal only.
+/// Reports to the user on stderr: notices always unless quiet, progress bars on a terminal only.
 pub struct Reporter {
     quiet: bool,
     bars: bool,
@@ -19,7 +19,7 @@ impl Reporter {
         Self { quiet, bars: !quiet && stderr().is_terminal() }
     }
 
-    /// Prints a line. What goes wrong with stderr itself can't be told to anybody.
+    /// Prints a line. What goes wrong with stderr itself can't be reported anywhere.
     pub fn line(&self, text: &str) {
         if !self.quiet {
             let _ = writeln!(stderr(), "{text}");

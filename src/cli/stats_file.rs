@@ -33,7 +33,7 @@ pub struct StatsFile {
     pub light_mesh_bytes: u64,
     /// Bytes held by the acceleration structure.
     pub acceleration_bytes: usize,
-    /// Largest memory of the process; null where the system does not tell.
+    /// Largest memory of the process; null where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
     /// Pixels that are infinite or not a number.
     pub non_finite_pixels: u64,
@@ -63,7 +63,7 @@ pub struct Seconds {
     pub mesh: f64,
     /// Shading.
     pub shade: f64,
-    /// Writing the pictures.
+    /// Writing the images.
     pub write: f64,
     /// All of it.
     pub total: f64,

@@ -10,10 +10,9 @@ mod outside;
 mod probe;
 
 use self::probe::Probe;
-use crate::accel::{Accel, Backend};
+use crate::accel::{Accel, Backend, with_accel};
 use crate::scene::load::OpenedScene;
 use crate::scene::{Camera, PointLight};
-use crate::with_accel;
 
 /// What is chosen for a scene that lacks a camera or lights; nothing for one that lacks neither.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,10 +4,8 @@
 //! out as noise. So mesh points also send occlusion rays to points on the lamps. Each kind of ray counts with the share
 //! that it has in the density of both, the balance heuristic (Veach, 1997), so that the sum is eq. (4) still.
 
+use crate::scene::{Hit, Interaction, Scene, SurfacePoint};
 use glam::{Vec2, Vec3};
-
-use crate::accel::Hit;
-use crate::scene::{Interaction, Scene, SurfacePoint};
 
 /// The shining triangles of a scene.
 #[derive(Clone, Debug, Default)]

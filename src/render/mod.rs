@@ -17,11 +17,10 @@ use self::conventional::ConventionalIntegrator;
 use self::light_mesh::LightMeshIntegrator;
 use self::reference::ReferenceIntegrator;
 use self::wavefront::{direct_scale, wavefront};
-use crate::accel::Backend;
+use crate::accel::{Backend, with_accel};
 use crate::light_mesh::{DirectMesh, IndirectMesh, LightTable, MeshError};
 use crate::scene::{Camera, Scene};
 use crate::settings::{Integrator, Settings};
-use crate::with_accel;
 
 /// Linear RGB picture, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]

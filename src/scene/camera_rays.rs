@@ -2,8 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::Camera;
-use crate::accel::Ray;
+use super::{Camera, Ray};
 
 /// Maps positions in the image to camera rays.
 #[derive(Clone, Debug)]

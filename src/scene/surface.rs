@@ -2,8 +2,7 @@
 
 use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
-use super::{Scene, TextureMap};
-use crate::accel::Hit;
+use super::{Hit, Scene, TextureMap};
 
 /// A visible surface point y (spec §1).
 ///

@@ -1,7 +1,5 @@
 //! Triangle meshes and scenes by hand, for tests of what rays hit.
 
-#![allow(dead_code, reason = "every test file uses a part")]
-
 use std::sync::Arc;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3};

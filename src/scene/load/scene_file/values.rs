@@ -105,7 +105,7 @@ number!(
     FieldOfView, |x| x > 0.0 && x < 180.0, "lie in (0, 180)");
 number!(
     /// Stops in [−100, 100].
-    Stops, |x| (-100.0..=100.0).contains(&x), "lie in [-100, 100]");
+    Stops, |x| x.abs() <= crate::settings::MAX_EXPOSURE, "lie in [-100, 100]");
 
 /// A three-component type: name, how it is written, the check, and the range in words.
 macro_rules! vector {

@@ -1,0 +1,69 @@
+//! The list of a gallery's images.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::super::error::CommandError;
+
+/// The list of images.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gallery {
+    /// The images in the order of the page.
+    #[serde(rename = "picture")]
+    pub images: Vec<ListedImage>,
+}
+
+/// One image of the list.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedImage {
+    /// Name of the files.
+    pub name: String,
+    /// Heading on the page.
+    pub(super) title: String,
+    /// Scene file, relative to the list.
+    pub scene: PathBuf,
+    /// What there is to see.
+    pub(super) caption: String,
+    /// Models that are not part of the project, relative to the list; where one is missing, the image is not rendered.
+    #[serde(default)]
+    needs: Vec<PathBuf>,
+}
+
+impl ListedImage {
+    /// The first of the models that it needs and that is not in the list's folder.
+    pub fn missing(&self, folder: &Path) -> Option<PathBuf> {
+        self.needs.iter().map(|model| folder.join(model)).find(|model| !model.exists())
+    }
+}
+
+impl Gallery {
+    /// Reads a list. Names are such that they can be names of files, and no two are the same.
+    ///
+    /// # Errors
+    /// [`CommandError::Read`] and [`CommandError::Malformed`].
+    pub fn read(file: &Path) -> Result<Self, CommandError> {
+        let malformed = |problem: String| CommandError::Malformed { file: file.to_owned(), problem };
+        let gallery: Self = toml::from_str(&read(file)?).map_err(|error| malformed(error.to_string()))?;
+        for (index, ListedImage { name, .. }) in gallery.images.iter().enumerate() {
+            let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if name.is_empty() || !name.chars().all(plain) {
+                let problem =
+                    format!("picture[{index}].name: letters, digits, - and _ make a name, found `{name}`");
+                return Err(malformed(problem));
+            }
+            if gallery.images.iter().take(index).any(|other| other.name == *name) {
+                return Err(malformed(format!("picture[{index}].name: there are two pictures `{name}`")));
+            }
+        }
+        Ok(gallery)
+    }
+}
+
+/// A text file's contents.
+pub(super) fn read(file: &Path) -> Result<String, CommandError> {
+    fs::read_to_string(file).map_err(|source| CommandError::Read { file: file.to_owned(), source })
+}

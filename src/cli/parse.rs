@@ -1,0 +1,126 @@
+//! Numbers on the command line, with the ranges that they must lie in.
+
+use std::str::FromStr;
+
+use glam::Vec3;
+
+use crate::image::MAX_PIXELS;
+use crate::settings::{MAX_EXPOSURE, Radius, Spacing};
+
+/// Largest width and height of an image.
+const MAX_SIDE: u32 = 1 << 16;
+
+/// A finite number for which `holds`; `wanted` says in words what that is.
+fn number<T: FromStr + Copy + Into<f64>>(
+    text: &str,
+    wanted: &str,
+    holds: impl Fn(f64) -> bool,
+) -> Result<T, String> {
+    match text.trim().parse::<T>() {
+        Ok(value) if value.into().is_finite() && holds(value.into()) => Ok(value),
+        _ => Err(format!("`{text}` is not {wanted}")),
+    }
+}
+
+/// A number above 0.
+pub fn positive<T: FromStr + Copy + Into<f64>>(text: &str) -> Result<T, String> {
+    number(text, "a number above 0", |value| value > 0.0)
+}
+
+/// A number that is not below 0.
+pub fn non_negative<T: FromStr + Copy + Into<f64>>(text: &str) -> Result<T, String> {
+    number(text, "a number from 0 up", |value| value >= 0.0)
+}
+
+/// Stops of exposure.
+pub fn exposure(text: &str) -> Result<f32, String> {
+    let wanted = format!("a number from −{MAX_EXPOSURE} to {MAX_EXPOSURE}");
+    number(text, &wanted, |stops| stops.abs() <= f64::from(MAX_EXPOSURE))
+}
+
+/// Width and height of an image in pixels.
+pub fn resolution(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    match sides {
+        Some((width, height)) if u64::from(width) * u64::from(height) <= MAX_PIXELS => Ok((width, height)),
+        Some(_) => Err(format!("more than {MAX_PIXELS} pixels")),
+        None => Err(format!("width and height from 1 to {MAX_SIDE}, such as 640x480")),
+    }
+}
+
+/// Three coordinates.
+pub fn point(text: &str) -> Result<Vec3, String> {
+    let numbers: Result<Vec<f32>, _> =
+        text.split(',').map(|text| number(text, "a number", |_| true)).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) => Ok(Vec3::new(x, y, z)),
+        _ => Err("three numbers, such as 0,1.5,-2".to_owned()),
+    }
+}
+
+/// A radius in scene units, or with the letter s in spacings.
+pub fn radius(text: &str) -> Result<Radius, String> {
+    match text.strip_suffix('s') {
+        Some(spacings) => positive(spacings).map(Radius::Spacings),
+        None => positive(text).map(Radius::Units),
+    }
+}
+
+/// A distance between mesh points: one for all axes, one per axis, or `auto`.
+pub fn spacing(text: &str) -> Result<Spacing, String> {
+    if text == "auto" {
+        return Ok(Spacing::Auto);
+    }
+    let numbers = text.split(',').map(positive).collect::<Result<Vec<_>, _>>()?;
+    match numbers[..] {
+        [all] => Ok(Spacing::Units(Vec3::splat(all))),
+        [x, y, z] => Ok(Spacing::Units(Vec3::new(x, y, z))),
+        _ => Err("one number or three".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A size that no image can have is refused before anything is rendered; the largest one is not.
+    #[test]
+    fn resolutions_end_where_images_end() {
+        assert_eq!(resolution("640x480"), Ok((640, 480)));
+        assert_eq!(u64::from(MAX_SIDE) * 4096, MAX_PIXELS);
+        assert_eq!(resolution("65536X4096"), Ok((65536, 4096)));
+        for wrong in ["65536x4097", "65537x1", "0x5", "5", "5x", "-1x5", "5x5x5", "4294967297x1"] {
+            assert!(resolution(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// The range is the scene file's, both ends included.
+    #[test]
+    fn exposures_lie_in_their_range() {
+        assert_eq!((exposure("100"), exposure("-100")), (Ok(100.0), Ok(-100.0)));
+        for wrong in ["100.5", "-101", "nan", "inf", "", "bright"] {
+            assert!(exposure(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// What is 0, or overflows single precision, is no length.
+    #[test]
+    fn lengths_are_above_0_and_finite() {
+        assert_eq!(radius("2.5s"), Ok(Radius::Spacings(2.5)));
+        assert_eq!(radius("2.5"), Ok(Radius::Units(2.5)));
+        assert_eq!(spacing("auto"), Ok(Spacing::Auto));
+        assert_eq!(spacing("1,2,3"), Ok(Spacing::Units(Vec3::new(1.0, 2.0, 3.0))));
+        for wrong in ["0", "-1", "1e39", "nan", "1,2", "1,0,1"] {
+            assert!(spacing(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn points_have_three_finite_coordinates() {
+        assert_eq!(point("0, 1.5,-2"), Ok(Vec3::new(0.0, 1.5, -2.0)));
+        for wrong in ["1,2", "1,2,3,4", "1,2,inf", ""] {
+            assert!(point(wrong).is_err(), "{wrong}");
+        }
+    }
+}

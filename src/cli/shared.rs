@@ -1,0 +1,107 @@
+//! Flags that several commands have.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::choice::one_of;
+use super::error::CommandError;
+use super::progress::Reporter;
+use crate::accel::{BackendChoice, check_memory, parse_size};
+use crate::scene::Scene;
+use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
+
+/// The scene that a command reads.
+#[derive(Args, Clone, Debug, Default)]
+pub struct SceneArgs {
+    /// Scene file (TOML) or model (.glb, .gltf, .obj, .ply; also .gz and .zst)
+    #[arg(value_name = "SCENE")]
+    pub path: PathBuf,
+}
+
+impl SceneArgs {
+    /// Reads the scene.
+    pub fn read(&self, reporter: &Reporter) -> Result<OpenedScene, CommandError> {
+        let spinner = reporter.spinner("reading");
+        let opened = open_scene(&self.path);
+        spinner.finish_and_clear();
+        Ok(opened?)
+    }
+
+    /// Reads the scene and reports what is doubtful about it.
+    pub fn open(&self, reporter: &Reporter) -> Result<OpenedScene, CommandError> {
+        let opened = self.read(reporter)?;
+        report_doubts(&opened.loaded, &self.path, reporter);
+        Ok(opened)
+    }
+}
+
+/// Reports what is doubtful about a scene, and what was left out of it.
+pub fn report_doubts(loaded: &LoadedScene, path: &Path, reporter: &Reporter) {
+    for warning in &loaded.warnings {
+        reporter.line(&format!("warning: {warning}"));
+    }
+    if !loaded.skipped.is_empty() {
+        reporter.line(&format!("warning: {}: left out {}", path.display(), loaded.skipped));
+    }
+}
+
+/// Whether a command reports to stderr what it does.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct QuietArgs {
+    /// Write nothing to stderr but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl QuietArgs {
+    /// What the command reports with.
+    pub fn reporter(self) -> Reporter {
+        Reporter::new(self.quiet)
+    }
+}
+
+/// The threads that a command works on.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct ThreadArgs {
+    /// Threads; 0 for one per processor
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
+    threads: u16,
+}
+
+impl ThreadArgs {
+    /// Starts the threads.
+    pub fn pool(self) -> Result<rayon::ThreadPool, CommandError> {
+        Ok(rayon::ThreadPoolBuilder::new().num_threads(usize::from(self.threads)).build()?)
+    }
+}
+
+/// What traces the rays of a command.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct BackendArgs {
+    /// Library that traces the rays, where the command doesn't compare them
+    #[arg(long, default_value_t, value_parser = one_of(&BackendChoice::NAMES))]
+    pub backend: BackendChoice,
+}
+
+/// How much memory a scene may take.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct MemoryArgs {
+    /// Refuse a scene that would take more memory while it is built, in all backends of the command together, by an
+    /// estimate: 500M, 8G
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    memory_limit: Option<u64>,
+}
+
+impl MemoryArgs {
+    /// Refuses a scene that takes more than the limit.
+    pub fn check(
+        self,
+        file: &SceneArgs,
+        scene: &Scene,
+        backends: &[BackendChoice],
+    ) -> Result<(), CommandError> {
+        check_memory(scene, backends, self.memory_limit)
+            .map_err(|source| CommandError::MemoryLimit { scene: file.path.clone(), source })
+    }
+}
