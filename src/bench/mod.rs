@@ -91,6 +91,9 @@ impl BenchOptions {
 /// Why a benchmark can't be run.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
+    /// There is no place for temporary files.
+    #[error("cannot create a temporary folder")]
+    Folder(#[source] std::io::Error),
     /// The scene can't be written.
     #[error(transparent)]
     Generate(#[from] GenerateError),
@@ -106,11 +109,11 @@ pub enum BenchError {
     /// A light mesh can't be set up.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A picture can't be held.
+    /// An image can't be held.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// Threads can't be started.
-    #[error("cannot start the threads: {0}")]
+    #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A process can't be measured.
     #[error("{}: {reason}", program.display())]
@@ -122,7 +125,7 @@ pub enum BenchError {
     },
 }
 
-/// Runs a benchmark; `log` hears what is being done.
+/// Runs a benchmark; `log` receives what is being done.
 ///
 /// # Errors
 /// See [`BenchError`].
