@@ -159,7 +159,8 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{Machine, Series};
+    use crate::bench::machine::Machine;
+    use crate::bench::report::Series;
 
     /// The file refers to nothing outside of itself, and names can't break out into markup.
     #[test]

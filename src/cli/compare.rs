@@ -56,7 +56,7 @@ pub struct CompareArgs {
 
 /// A number whose exceeding fails the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limit {
+struct Limit {
     metric: Metric,
     limit: f64,
 }
