@@ -39,7 +39,7 @@ pub enum Benchmark {
     Headline,
     /// Time over resolution, lights, triangles, spacing and threads.
     Scaling,
-    /// Rays per second of the backends, by kind of ray and packet width.
+    /// Rays per second of all backends, by kind of ray and packet width.
     Backends,
     /// Evaluation of mesh points against a loop that only traces the same rays.
     Rays,
@@ -54,7 +54,7 @@ impl Benchmark {
             "The paper's comparison: a forest by light mesh and by conventional tracing",
         ),
         ("scaling", Self::Scaling, "Time over resolution, lights, triangles, spacing and threads"),
-        ("backends", Self::Backends, "Rays per second of the backends, by kind of ray and packet width"),
+        ("backends", Self::Backends, "Rays per second of all backends, by kind of ray and packet width"),
         ("rays", Self::Rays, "Evaluation of mesh points against a loop that only traces the same rays"),
     ];
 }
