@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use divan::{Bencher, black_box};
 use glam::{Vec3, Vec4};
-use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayPacket};
+use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, RayPacket};
 use lightmesh::light_mesh::{
     Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
     Scratch, directional,
 };
 use lightmesh::scene::random::SplitMix64;
 use lightmesh::scene::{
-    Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint, TriangleMaterials,
+    Instance, LightShape, Material, PointLight, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
     TriangleMesh,
 };
 use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};
@@ -46,7 +46,6 @@ fn scene(lights: usize) -> Scene {
         uvs: None,
         colors: None,
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     let light = |_| PointLight {
         position: random.in_box(Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.3, 1.0)),

@@ -10,8 +10,8 @@ use std::time::Instant;
 use glam::Vec3;
 #[cfg(feature = "embree")]
 use lightmesh::accel::EmbreeAccel;
-use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket};
-use lightmesh::scene::{Instance, Positions, Scene, TriangleMaterials, TriangleMesh};
+use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, RayHitPacket, RayPacket};
+use lightmesh::scene::{Instance, Positions, Ray, Scene, TriangleMaterials, TriangleMesh};
 
 const LIGHTS: usize = 96;
 const ROUNDS: usize = 5;
@@ -70,7 +70,6 @@ fn forest(triangles: usize) -> Scene {
         uvs: None,
         colors: None,
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     Scene {
         meshes: vec![Arc::new(mesh)],

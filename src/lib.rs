@@ -7,6 +7,7 @@ pub mod accel;
 mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
+mod color;
 #[cfg(feature = "cli")]
 pub mod crosscheck;
 pub mod framing;

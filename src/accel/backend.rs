@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{BruteForceAccel, BvhAccel, BvhError};
+use super::{Accel, BruteForceAccel, BvhAccel, BvhError, Coherence, LaneMask, RayHitPacket, RayPacket};
 #[cfg(feature = "embree")]
 use super::{EmbreeAccel, EmbreeError};
-use crate::scene::Scene;
+use crate::scene::{Hit, Ray, Scene};
 
 /// What the user asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,6 +54,10 @@ impl FromStr for BackendChoice {
 }
 
 /// An acceleration structure of one of the backends.
+///
+/// A `Backend` is an [`Accel`] that looks up its variant in every call. That takes little beside tracing a ray, but keeps
+/// queries from being inlined. Code that traces a few rays takes a `Backend`; a loop over millions of rays is generic over
+/// [`Accel`] and is called with the variant's own structure, which [`render`](crate::render) looks up once.
 pub enum Backend {
     /// Debian's Embree.
     #[cfg(feature = "embree")]
@@ -81,7 +85,6 @@ pub enum BackendError {
 }
 
 /// Runs `$body` with `$accel` bound to the backend's own type, so that everything within is dispatched statically.
-#[macro_export]
 macro_rules! with_accel {
     ($backend:expr, $accel:ident => $body:expr) => {
         match $backend {
@@ -95,6 +98,7 @@ macro_rules! with_accel {
         }
     };
 }
+pub(crate) use with_accel;
 
 /// A backend, and what the user should know about the choice.
 pub struct Chosen {
@@ -175,6 +179,42 @@ impl Backend {
             Self::Embree(accel) => accel.version(),
             _ => env!("CARGO_PKG_VERSION").to_owned(),
         }
+    }
+}
+
+impl Accel for Backend {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        with_accel!(self, accel => accel.intersect(ray))
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        with_accel!(self, accel => accel.occluded(ray))
+    }
+
+    #[inline]
+    fn intersect_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayHitPacket<N>,
+        coherence: Coherence,
+    ) {
+        with_accel!(self, accel => accel.intersect_packet(active, packet, coherence));
+    }
+
+    #[inline]
+    fn occluded_packet<const N: usize>(
+        &self,
+        active: LaneMask,
+        packet: &mut RayPacket<N>,
+        coherence: Coherence,
+    ) -> LaneMask {
+        with_accel!(self, accel => accel.occluded_packet(active, packet, coherence))
+    }
+
+    fn memory_bytes(&self) -> usize {
+        with_accel!(self, accel => accel.memory_bytes())
     }
 }
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use crate::scene::{Scene, TriangleMesh};
+use crate::scene::{AlphaMasks, Hit, MaskedMesh, Ray, Scene, TriangleMesh};
 
 use super::bvh::WorldToObject;
 use super::{
-    Accel, Coherence, Hit, INVALID_ID, LaneMask, MAX_COORDINATE, Ray, RayHitPacket, RayPacket,
+    Accel, Coherence, INVALID_ID, LaneMask, MAX_COORDINATE, RayHitPacket, RayPacket, is_valid_ray,
     largest_coordinate,
 };
 
@@ -17,9 +17,16 @@ use super::{
 /// It is the watertight test of Woop, Benthin and Wald (2013), one triangle after the other, with no
 /// boxes, no SIMD and no stack. Its arithmetic is that of the BVH, so that hits must agree to the last bit.
 pub struct BruteForceAccel {
-    instances: Vec<(Arc<TriangleMesh>, Placement)>,
+    instances: Vec<Placed>,
     /// Of the coordinates of rays.
     largest: f32,
+}
+
+struct Placed {
+    mesh: Arc<TriangleMesh>,
+    /// The mesh with its alpha masks, if it has any.
+    masked: Option<MaskedMesh>,
+    placement: Placement,
 }
 
 enum Placement {
@@ -32,6 +39,7 @@ enum Placement {
 impl BruteForceAccel {
     /// Takes hold of the scene's meshes. Instances of meshes that don't exist are left out.
     pub fn new(scene: &Scene) -> Self {
+        let masks = AlphaMasks::of_scene(scene);
         let instances = scene.instances.iter().filter_map(|instance| {
             let placement = match &instance.to_world {
                 None => Placement::World,
@@ -39,17 +47,19 @@ impl BruteForceAccel {
                     WorldToObject::new(to_world).map_or(Placement::Nowhere, Placement::Instanced)
                 }
             };
-            Some((scene.meshes.get(instance.mesh as usize)?.clone(), placement))
+            let mesh = scene.meshes.get(instance.mesh as usize)?.clone();
+            let masked = masks.of_mesh(&mesh);
+            Some(Placed { mesh, masked, placement })
         });
         Self { instances: instances.collect(), largest: largest_coordinate(scene) }
     }
 
     /// Calls `found` with every hit; stops when that returns true.
     fn each_hit(&self, ray: &Ray, mut found: impl FnMut(Hit) -> bool) {
-        if !ray.is_valid(self.largest) {
+        if !is_valid_ray(ray, self.largest) {
             return;
         }
-        for (instance, (mesh, placement)) in self.instances.iter().enumerate() {
+        for (instance, Placed { mesh, masked, placement }) in self.instances.iter().enumerate() {
             let local = match placement {
                 Placement::World => *ray,
                 Placement::Instanced(to_object) => to_object.ray(ray),
@@ -61,7 +71,7 @@ impl BruteForceAccel {
             }
             for triangle in 0..mesh.triangles.len() as u32 {
                 let Some((t, u, v)) = hit_triangle(&local, mesh.corners(triangle)) else { continue };
-                if mesh.cutout.as_ref().is_some_and(|opaque| !opaque(triangle, u, v)) {
+                if masked.as_ref().is_some_and(|masked| !masked.is_opaque(triangle, u, v)) {
                     continue;
                 }
                 if found(Hit { t, u, v, instance: instance as u32, triangle }) {
@@ -145,7 +155,7 @@ impl Accel for BruteForceAccel {
         for lane in (0..N).filter(|lane| active >> lane & 1 != 0) {
             let Some(hit) = self.intersect(&lane_of(&packet.ray, lane)) else { continue };
             let instance = hit.instance;
-            let fixed = matches!(self.instances[instance as usize].1, Placement::World);
+            let fixed = matches!(self.instances[instance as usize].placement, Placement::World);
             packet.ray.tfar[lane] = hit.t;
             packet.hit.u[lane] = hit.u;
             packet.hit.v[lane] = hit.v;

@@ -1,13 +1,14 @@
 //! The `embree` backend: Embree 4 or 3, whichever is installed.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use embree_sys::{Device, Error, Geometry, Library, SceneBuilder};
+use embree_sys::{Device, Error, Geometry, Library, Opacity, SceneBuilder};
 use thiserror::Error as ThisError;
 
-use super::ray::columns;
-use super::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Scene, TriangleMesh};
+use super::limits::columns;
+use super::{Accel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket};
+use crate::scene::{AlphaMasks, Hit, Ray, Scene, TriangleMesh};
 
 /// What keeps Embree from being used.
 #[derive(Clone, Debug, ThisError)]
@@ -80,6 +81,7 @@ impl EmbreeAccel {
         let device = Device::new(library, &threads).map_err(EmbreeError::Library)?;
         let mut top = SceneBuilder::new(&device).map_err(EmbreeError::Setup)?;
         let mut placed = HashMap::new();
+        let masks = AlphaMasks::of_scene(scene);
         for (id, instance) in (0..INVALID_ID).zip(&scene.instances) {
             let mesh = scene
                 .meshes
@@ -87,12 +89,12 @@ impl EmbreeAccel {
                 .ok_or(EmbreeError::NoSuchMesh { instance: id as usize, mesh: instance.mesh })?;
             let mesh_error = |error| EmbreeError::Mesh { name: mesh.name.clone(), error };
             let geometry = match instance.to_world {
-                None => triangles(&device, mesh).map_err(mesh_error)?,
+                None => triangles(&device, mesh, &masks).map_err(mesh_error)?,
                 Some(to_world) => {
                     let object = match placed.get(&instance.mesh) {
                         Some(object) => object,
                         None => {
-                            let object = object(&device, mesh).map_err(mesh_error)?;
+                            let object = object(&device, mesh, &masks).map_err(mesh_error)?;
                             placed.entry(instance.mesh).or_insert(object)
                         }
                     };
@@ -121,14 +123,17 @@ impl EmbreeAccel {
 }
 
 /// A mesh as an Embree geometry.
-fn triangles(device: &Device, mesh: &TriangleMesh) -> Result<Geometry, Error> {
-    Geometry::triangles(device, mesh.positions.padded().clone(), mesh.triangles.clone(), mesh.cutout.clone())
+fn triangles(device: &Device, mesh: &Arc<TriangleMesh>, masks: &AlphaMasks) -> Result<Geometry, Error> {
+    let opacity = masks
+        .of_mesh(mesh)
+        .map(|masked| -> Opacity { Arc::new(move |triangle, u, v| masked.is_opaque(triangle, u, v)) });
+    Geometry::triangles(device, mesh.positions.padded().clone(), mesh.triangles.clone(), opacity)
 }
 
 /// A scene of one mesh, for instances.
-fn object(device: &Device, mesh: &TriangleMesh) -> Result<embree_sys::Scene, Error> {
+fn object(device: &Device, mesh: &Arc<TriangleMesh>, masks: &AlphaMasks) -> Result<embree_sys::Scene, Error> {
     let mut builder = SceneBuilder::new(device)?;
-    builder.attach(0, triangles(device, mesh)?)?;
+    builder.attach(0, triangles(device, mesh, masks)?)?;
     builder.commit()
 }
 

@@ -8,24 +8,32 @@ mod brute_force;
 pub mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
+mod limits;
 mod memory;
-mod ray;
+mod packet;
 
+pub(crate) use backend::with_accel;
 pub use backend::{Backend, BackendChoice, BackendError, Chosen, UnknownBackend};
 pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError};
 #[cfg(feature = "embree")]
 pub use embree::{EmbreeAccel, EmbreeError};
+pub use limits::{MAX_COORDINATE, MIN_DIRECTION, is_valid_ray, largest_coordinate, largest_coordinate_of};
 pub use memory::{Footprint, MemoryEstimate, MemoryLimitError, check_memory, parse_size};
-pub use ray::*;
+pub use packet::{Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+
+use crate::scene::{Hit, Ray};
 
 /// Ray queries against one scene.
 ///
 /// All queries count a triangle as hit from both sides. Triangles with a coordinate that is not finite or beyond
 /// ±[`MAX_COORDINATE`] are never hit, nor are instances whose [placement can't be undone](largest_coordinate_of);
-/// rays that are [not valid](Ray::is_valid) hit nothing. Triangles with a cut-out
-/// ([`TriangleMesh::cutout`](crate::scene::TriangleMesh::cutout)) are hit only where it is opaque. A
-/// hit exactly at either end of the valid interval may or may not be reported.
+/// rays that are [not valid](is_valid_ray) hit nothing. Triangles whose material has an
+/// [alpha mask](crate::scene::AlphaMask) are hit only where that is opaque. A hit exactly at either end of the valid
+/// interval may or may not be reported.
+///
+/// An acceleration structure holds geometry and alpha masks, and nothing else of the scene: cameras, lights and the
+/// other properties of materials may change without a new one.
 pub trait Accel: Send + Sync {
     /// Nearest hit of one ray.
     fn intersect(&self, ray: &Ray) -> Option<Hit>;

@@ -8,12 +8,11 @@ use super::setup::{PAPER_TRIANGLES, Setup, forest, new_report};
 use super::timing::{Samples, timed};
 use super::{BenchError, BenchOptions};
 use crate::accel::{
-    Accel, Backend, BackendChoice, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane,
+    Accel, Backend, BackendChoice, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane, with_accel,
 };
 use crate::light_mesh::SphereStrata;
-use crate::render::CameraRays;
 use crate::scene::random::SplitMix64;
-use crate::with_accel;
+use crate::scene::{CameraRays, Ray};
 
 /// Rays of one kind, in an order in which neighbours make good packets.
 struct Bundle {
@@ -83,7 +82,7 @@ impl Contestant {
         let Some(backend) = built else { return Ok(None) };
         let name = format!("{backend}, {triangles} triangles");
         let build = report.record(format!("{name}: build"), builds);
-        let bytes = with_accel!(&backend, accel => accel.memory_bytes());
+        let bytes = backend.memory_bytes();
         let title = format!(
             "{name}: Mray/s by packet width; built in {build:.3} s, {:.0} bytes per triangle",
             bytes as f64 / triangles as f64

@@ -7,11 +7,10 @@ use super::report::{Aim, Goal, Report, Table};
 use super::setup::{PAPER_LIGHTS, PAPER_TRIANGLES, forest, new_report};
 use super::timing::timed;
 use super::{BenchError, BenchOptions};
-use crate::accel::{Accel, Backend, Coherence, PacketLanes, Ray, RayPacket};
+use crate::accel::{Accel, Backend, Coherence, PacketLanes, RayPacket, with_accel};
 use crate::light_mesh::{Basis, DirectValues, LANES, LightTable, MeshPoints, PointMask};
-use crate::scene::{PointLight, Scene};
+use crate::scene::{PointLight, Ray, Scene};
 use crate::settings::{PointSettings, Spacing};
-use crate::with_accel;
 
 /// Spacing of the mesh points, scene units.
 const SPACING: f32 = 0.5;

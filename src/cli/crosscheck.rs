@@ -10,11 +10,11 @@ use glam::Vec3;
 use super::error::{CommandError, Outcome};
 use super::parse;
 use super::shared::{MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
-use crate::accel::{Accel, Backend, BackendChoice, Ray};
+use crate::accel::{Backend, BackendChoice};
 use crate::crosscheck::{Options, Subject, crosscheck, from_text, replay, watertightness};
 use crate::image::OutputFile;
 use crate::render::Progress;
-use crate::with_accel;
+use crate::scene::Ray;
 
 /// What `crosscheck` takes.
 #[derive(Args, Debug)]
@@ -63,11 +63,8 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Outcome, Comman
         reporter.line(&format!("note: {notice}"));
     }
     let names: Vec<_> = backends.iter().map(ToString::to_string).collect();
-    let subjects: Vec<_> = names
-        .iter()
-        .zip(&backends)
-        .map(|(name, backend)| with_accel!(backend, accel => subject(name, accel)))
-        .collect();
+    let subjects: Vec<_> =
+        names.iter().zip(&backends).map(|(name, backend)| Subject { name, accel: backend }).collect();
 
     if let Some(rays) = rays {
         let replay = pool.install(|| replay(scene, &subjects, &rays));
@@ -97,10 +94,6 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Outcome, Comman
     }
     write!(out, "{report}")?;
     Ok(Outcome::of(report.is_clean()))
-}
-
-fn subject<'a>(name: &'a str, accel: &'a impl Accel) -> Subject<'a> {
-    Subject { name, accel }
 }
 
 /// The rays of a file, or the one ray that is given itself.

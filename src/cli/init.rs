@@ -8,10 +8,11 @@ use clap::Args;
 use super::error::{CommandError, Outcome};
 use super::shared::{QuietArgs, report_doubts};
 use crate::accel::{Backend, BackendChoice};
-use crate::framing::complete_view;
+use crate::framing::choose_view;
 use crate::image::OutputFile;
+use crate::image::tone::auto_exposure;
 use crate::render::render;
-use crate::scene::load::{ModelFormat, OpenedScene, auto_exposure, complete, load_model};
+use crate::scene::load::{ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, LightShape, PointLight};
 use crate::settings::{Integrator, Settings, Spacing};
 
@@ -45,11 +46,11 @@ pub fn run(args: &InitArgs) -> Result<Outcome, CommandError> {
     spinner.finish_and_clear();
     let model = model?;
     let (has_lights, has_cameras) = (!model.lights.is_empty(), !model.cameras.is_empty());
-    let mut opened = complete(model);
+    let opened = OpenedScene::of_model(model);
     report_doubts(&opened.loaded, &args.model, &reporter);
     let spinner = reporter.spinner("choosing");
     let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene)?.backend;
-    complete_view(&mut opened, &backend);
+    let opened = choose_view(&opened, &backend).complete(opened);
     let exposure = exposure(&opened, &backend);
     spinner.finish_and_clear();
     let folder = args.output.parent().unwrap_or(Path::new(""));

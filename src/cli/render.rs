@@ -10,13 +10,12 @@ use super::overrides::Overrides;
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend};
-use crate::framing::complete_view;
+use crate::framing::choose_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
-use crate::image::{Image, exr::SampleType};
+use crate::image::{Image, exr::SampleType, tone::auto_exposure};
 use crate::render::{Film, RenderStats, render};
-use crate::scene::load::{LoadedScene, OpenedScene, auto_exposure};
+use crate::scene::load::{LoadedScene, OpenedScene};
 use crate::settings::Settings;
-use crate::with_accel;
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
@@ -83,8 +82,8 @@ fn render_to(
     seconds.build = stage.elapsed().as_secs_f64();
 
     let stage = Instant::now();
-    complete_view(&mut opened, &chosen.backend);
-    let OpenedScene { loaded, choices, bare } = opened;
+    let view = choose_view(&opened, &chosen.backend);
+    let OpenedScene { loaded, choices, bare } = view.complete(opened);
     let LoadedScene { scene, cameras, mut settings, .. } = loaded;
     for choice in &choices {
         reporter.line(&format!("note: {choice}"));
@@ -144,7 +143,7 @@ fn render_to(
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,
-        acceleration_bytes: with_accel!(&chosen.backend, accel => accel.memory_bytes()),
+        acceleration_bytes: chosen.backend.memory_bytes(),
         peak_rss_bytes: peak_rss_bytes(),
         non_finite_pixels,
     };

@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::judge::LocalRay;
+use super::local_ray::{BOUND, LocalRay};
 use crate::scene::Bounds;
 
 /// Boxes per leaf.
@@ -48,10 +48,15 @@ pub struct Walker {
 pub type Stack = Vec<(u32, f64)>;
 
 impl Walker {
-    /// The ray, with a width of `relative` times the distance that grows along it.
-    pub fn new(ray: &LocalRay, relative: f64) -> Self {
+    /// The ray, with the width of its doubt and of a triangle's.
+    pub fn new(ray: &LocalRay) -> Self {
         let inverse = ray.direction.to_array().map(|d| if d == 0.0 { f64::INFINITY } else { 1.0 / d });
-        Self { origin: ray.origin, inverse: inverse.into(), relative, absolute: ray.origin_error }
+        Self {
+            origin: ray.origin,
+            inverse: inverse.into(),
+            relative: BOUND + ray.spread(),
+            absolute: ray.origin_error,
+        }
     }
 
     /// Where the ray enters the widened box, within `0..=limit`.
@@ -169,7 +174,7 @@ fn split(boxes: &mut [(Bounds, u32)], centers: &Bounds) -> usize {
         }
     }
     if best == 0 {
-        // All centers in one place, or not to be told apart.
+        // All centers are in one place, or too close for the bins.
         let half = boxes.len() / 2;
         boxes.select_nth_unstable_by(half, |a, b| a.0.center()[axis].total_cmp(&b.0.center()[axis]));
         return half;

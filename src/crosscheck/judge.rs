@@ -1,27 +1,20 @@
 //! What is true of a ray, in double precision, and what single precision may make of it.
 //!
 //! The bounds are derived in docs/crosscheck.md. In short: a ray tracer in single precision sees every corner
-//! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] asks whether a triangle is
+//! moved by a few roundings of its distance from the ray's origin. [`Judge::test`] decides whether a triangle is
 //! hit, missed, or within that doubt.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::{BoxTree, Stack, Walker};
+use super::crossing::Crossing;
+use super::local_ray::LocalRay;
 use super::placement::Placement;
-use crate::accel::{Hit, MAX_COORDINATE, Ray, largest_coordinate};
-use crate::scene::{Bounds, Scene, TriangleMesh};
+use crate::accel::{MAX_COORDINATE, is_valid_ray, largest_coordinate};
+use crate::scene::{Bounds, Hit, Ray, Scene, TriangleMesh};
 
-/// How far a corner seems moved, in units of its distance from the ray's origin: 16 roundings of 2⁻²⁴.
-pub const BOUND: f64 = 16.0 / (1 << 24) as f64;
-
-/// What single precision may add to a product of three lengths by rounding to denormals.
-const UNDERFLOW: f64 = 1e-40;
-
-/// Products beyond this may overflow in single precision.
-const OVERFLOW: f64 = 1e37;
-
-/// A triangle that a ray hits, or that it may be said to hit.
+/// A triangle that a ray hits, or may be reported to hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// Index into [`Scene::instances`].
@@ -51,7 +44,7 @@ impl Candidate {
     }
 }
 
-/// What may be said of a ray.
+/// What the answers about a ray may be.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     /// No certain hit ends later than this; infinite if there is none.
@@ -102,10 +95,10 @@ impl<'a> Judge<'a> {
 
     /// Whether the ray can hit anything at all.
     pub fn is_ray(&self, ray: &Ray) -> bool {
-        ray.is_valid(self.largest)
+        is_valid_ray(ray, self.largest)
     }
 
-    /// Whether a ray hits a triangle; `None` where every ray tracer must say no.
+    /// Whether a ray hits a triangle; `None` where no ray tracer may report it.
     pub fn test(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<Candidate> {
         if !self.is_ray(ray) {
             return None;
@@ -115,11 +108,12 @@ impl<'a> Judge<'a> {
         if triangle as usize >= mesh.triangles.len() || !is_usable(&mesh.corners(triangle)) {
             return None;
         }
-        Self::test_local(ray, &local, mesh, instance, triangle)
+        self.test_local(ray, &local, mesh, instance, triangle)
     }
 
     /// [`Judge::test`] for a triangle that exists and is usable.
     fn test_local(
+        &self,
         ray: &Ray,
         local: &LocalRay,
         mesh: &TriangleMesh,
@@ -136,8 +130,8 @@ impl<'a> Judge<'a> {
         }
         let within = t - error > near && t + error < far;
         let mut certain = crossing.certain && within;
-        if let Some(opaque) = &mesh.cutout {
-            let answers = crossing.surroundings().map(|(u, v)| opaque(triangle, u, v));
+        if let Some(mask) = self.scene.alpha_mask(mesh, triangle) {
+            let answers = crossing.surroundings().map(|(u, v)| mask.is_opaque(mesh.uv(triangle, u, v)));
             if answers == [false; 9] && crossing.certain {
                 return None;
             }
@@ -167,13 +161,13 @@ impl<'a> Judge<'a> {
         let Some(world) = Placement::World.ray(ray) else { return };
         let mut limit = f64::from(ray.t_far);
         let (mut stack, mut inner) = (Stack::with_capacity(64), Stack::with_capacity(64));
-        self.top.walk(&world.walker(), &mut stack, widened(limit), |instance, _| {
+        self.top.walk(&Walker::new(&world), &mut stack, widened(limit), |instance, _| {
             let placement = &self.placements[instance as usize];
             let Some(local) = placement.ray(ray) else { return widened(limit) };
             let mesh = self.scene.instances[instance as usize].mesh as usize;
             let (tree, mesh) = (&self.trees[mesh], &self.scene.meshes[mesh]);
-            tree.walk(&local.walker(), &mut inner, widened(limit), |triangle, _| {
-                if let Some(candidate) = Self::test_local(ray, &local, mesh, instance, triangle) {
+            tree.walk(&Walker::new(&local), &mut inner, widened(limit), |triangle, _| {
+                if let Some(candidate) = self.test_local(ray, &local, mesh, instance, triangle) {
                     limit = limit.min(found(&candidate));
                 }
                 widened(limit)
@@ -182,8 +176,8 @@ impl<'a> Judge<'a> {
         });
     }
 
-    /// Whether a nearest hit may be reported.
-    pub fn admits_nearest(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
+    /// Whether a closest hit may be reported.
+    pub fn admits_closest(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
         let Some(hit) = hit else { return truth.certain_before == f64::INFINITY };
         let t = f64::from(hit.t);
         let inside = hit.t >= ray.t_near.max(0.0) && hit.t <= ray.t_far;
@@ -206,141 +200,4 @@ fn widened(limit: f64) -> f64 {
 /// Whether a triangle is in the scene at all.
 fn is_usable(corners: &[Vec3; 3]) -> bool {
     corners.iter().all(|corner| corner.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
-}
-
-/// A ray in an instance's space.
-#[derive(Clone, Copy, Debug)]
-pub struct LocalRay {
-    /// Origin.
-    pub origin: DVec3,
-    /// Direction.
-    pub direction: DVec3,
-    /// By how much an origin in single precision may be off.
-    pub origin_error: f64,
-    /// The same for the direction.
-    direction_error: f64,
-    /// Length of the direction.
-    length: f64,
-    /// The direction at length 1.
-    along: DVec3,
-    /// Two directions across it.
-    across: (DVec3, DVec3),
-}
-
-impl LocalRay {
-    /// A ray whose origin and direction may be off by the two errors.
-    pub fn new(origin: DVec3, direction: DVec3, [origin_error, direction_error]: [f64; 2]) -> Self {
-        let length = direction.length();
-        let along = direction / length;
-        let across = along.any_orthonormal_pair();
-        Self { origin, direction, origin_error, direction_error, length, along, across }
-    }
-
-    /// For walks through boxes.
-    pub fn walker(&self) -> Walker {
-        // At a distance r the ray has turned aside by r · Δd / |d|.
-        Walker::new(self, BOUND + self.direction_error / self.length)
-    }
-}
-
-/// A ray and a triangle that can't be told to miss each other.
-struct Crossing {
-    t: f64,
-    error: f64,
-    /// Whether the ray passes so far inside all edges that there is no doubt.
-    certain: bool,
-    in_plane: bool,
-    u: f64,
-    v: f64,
-    /// By how much u and v may be off.
-    weight_error: f64,
-}
-
-impl Crossing {
-    /// `corners` are relative to the ray's origin.
-    fn new(ray: &LocalRay, corners: [DVec3; 3]) -> Option<Self> {
-        let (length, along, across) = (ray.length, ray.along, ray.across);
-        let reach = corners.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max).sqrt();
-        // δ: how far a corner seems moved.
-        let moved = BOUND * reach + ray.origin_error + ray.direction_error / length * reach;
-        let flat = corners.map(|corner| [corner.dot(across.0), corner.dot(across.1)]);
-        let [a, b, c] = corners;
-        let sides = [(1, 2), (2, 0), (0, 1)];
-        let lengths = sides.map(|(p, q)| (corners[q] - corners[p]).length_squared());
-        let longest = lengths.into_iter().fold(0.0, f64::max).sqrt();
-        let distances = flat.map(|[x, y]| x * x + y * y);
-        let (lengths, distances) = (lengths.map(f64::sqrt), distances.map(f64::sqrt));
-        let edges = sides.map(|(p, q)| flat[p][0] * flat[q][1] - flat[p][1] * flat[q][0]);
-        let overflow = reach * longest * reach.max(longest) * length.max(1.0) > OVERFLOW;
-        let doubts: [f64; 3] = std::array::from_fn(|i| {
-            let (p, q) = sides[i];
-            // A moved corner turns its edge about the other one.
-            let widened = moved * (lengths[i] + distances[p] + distances[q]);
-            if overflow { f64::INFINITY } else { widened + UNDERFLOW / length.min(1.0) }
-        });
-        let sign = |i: usize| {
-            if edges[i] > doubts[i] {
-                1
-            } else if edges[i] < -doubts[i] {
-                -1
-            } else {
-                0
-            }
-        };
-        let signs = [sign(0), sign(1), sign(2)];
-        if signs.contains(&1) && signs.contains(&-1) {
-            return None;
-        }
-        let inside = signs == [1; 3] || signs == [-1; 3];
-
-        let normal = (b - a).cross(c - a);
-        let area = normal.length();
-        let cosine = (normal.dot(along) / area).abs();
-        // By how much the normal seems turned: by its own rounding, and by the corners'.
-        let tilt = BOUND * longest * longest / area;
-        let turned = BOUND + tilt + moved * longest / area;
-        // NaN, of a triangle without area, is parallel to everything.
-        let crosses = cosine > 2.0 * turned;
-        let parallel = !crosses || overflow || area * length < UNDERFLOW / BOUND;
-        // Whatever becomes of the division, a hit is about where the triangle is.
-        let depths = corners.map(|corner| corner.dot(along) / length);
-        let (nearest, farthest) =
-            (depths[0].min(depths[1]).min(depths[2]), depths[0].max(depths[1]).max(depths[2]));
-        let rough = 0.5 * (farthest - nearest) + (moved + longest) / length;
-        let (t, error) = if overflow {
-            (0.0, f64::INFINITY)
-        } else if parallel {
-            (0.5 * (nearest + farthest), rough)
-        } else {
-            (
-                a.dot(normal) / ray.direction.dot(normal),
-                (moved + tilt * longest) / (length * (cosine - turned)),
-            )
-        };
-        let weight_error = if parallel { 1.0 } else { turned / (cosine - turned) };
-        let total = edges[0] + edges[1] + edges[2];
-        // Of a triangle that is seen edge-on it is no number.
-        let weight = |part: f64| if part.is_finite() { part } else { 1.0 / 3.0 };
-        Some(Self {
-            t,
-            error,
-            certain: inside && !parallel,
-            in_plane: parallel,
-            u: weight(edges[1] / total),
-            v: weight(edges[2] / total),
-            weight_error: weight_error.min(1.0),
-        })
-    }
-
-    /// Barycentric coordinates all around the hit, within the doubt and the triangle.
-    fn surroundings(&self) -> [(f32, f32); 9] {
-        let e = self.weight_error;
-        let mut around = [(0.0, 0.0); 9];
-        for (slot, (i, j)) in around.iter_mut().zip((-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)))) {
-            let u = (self.u + f64::from(i) * e).clamp(0.0, 1.0);
-            let v = (self.v + f64::from(j) * e).clamp(0.0, 1.0 - u);
-            *slot = (u as f32, v as f32);
-        }
-        around
-    }
 }

@@ -1,13 +1,11 @@
-//! The rays that are asked about: those of rendering, and those that break ray tracers.
+//! The rays that are traced: those of rendering, and those that break ray tracers.
 
 use glam::{Vec2, Vec3};
 
-use super::queries::Ask;
-use crate::accel::Ray;
+use super::queries::{GROUP, RayQueries};
 use crate::light_mesh::LightTable;
-use crate::render::CameraRays;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, Camera, PointLight, Scene, SurfacePoint};
+use crate::scene::{Bounds, Camera, CameraRays, PointLight, Ray, Scene, SurfacePoint};
 
 macro_rules! kinds {
     ($($kind:ident $name:literal $what:literal,)*) => {
@@ -47,14 +45,14 @@ kinds! {
 /// Side of the squares of pixels that camera rays go through.
 const SQUARE: u32 = 64;
 
-/// Resolution of the pictures that camera rays are taken from.
+/// Resolution of the images that camera rays are taken from.
 const RESOLUTION: (u32, u32) = (1024, 768);
 
 /// Camera rays per pixel to choose from.
 const SAMPLES: u32 = 16;
 
-/// Rays that are made in one place, or each somewhere else: as many as are asked about in one go.
-const RUN: usize = super::GROUP;
+/// Rays that are made in one place, or each somewhere else: as many as are traced in one go.
+const RUN: usize = GROUP;
 
 /// Of so many runs one has its rays apart.
 const APART: u64 = 4;
@@ -88,13 +86,13 @@ pub struct RaySource<'a> {
     /// Triangles up to and with each instance.
     triangles: Vec<u64>,
     /// Finds the surface points.
-    tracer: &'a dyn Ask,
+    tracer: &'a dyn RayQueries,
     seed: u64,
 }
 
 impl<'a> RaySource<'a> {
     /// A scene without lights gets a few in its corners.
-    pub fn new(scene: &'a Scene, cameras: &[Camera], tracer: &'a dyn Ask, seed: u64) -> Self {
+    pub fn new(scene: &'a Scene, cameras: &[Camera], tracer: &'a dyn RayQueries, seed: u64) -> Self {
         let mut bounds = scene.bounds();
         if bounds.is_empty() {
             bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
@@ -107,8 +105,9 @@ impl<'a> RaySource<'a> {
         }
         let lights = if scene.lights.is_empty() {
             let mut random = SplitMix64::new(seed);
-            let lights: Vec<_> =
-                (0..20).map(|_| PointLight::new(random.in_box(bounds.min, bounds.max), Vec3::ONE)).collect();
+            let lights: Vec<_> = (0..20)
+                .map(|_| PointLight::point(random.in_box(bounds.min, bounds.max), Vec3::ONE))
+                .collect();
             LightTable::of_scene(&Scene { lights, ..Scene::default() })
         } else {
             LightTable::of_scene(scene)
@@ -215,7 +214,7 @@ impl<'a> RaySource<'a> {
                 Some(camera) => camera.ray(x, y, random.next() as u32 % SAMPLES),
                 None => Ray::new(self.anywhere(random), direction(random)),
             };
-            if let Some(hit) = self.tracer.nearest(&ray) {
+            if let Some(hit) = self.tracer.closest(&ray) {
                 return (ray.direction, self.scene.interaction(&hit, ray.direction).point);
             }
             pixel = self.pixel(random);

@@ -4,8 +4,12 @@
 //! What is checked and how it is judged is written down in docs/crosscheck.md.
 
 mod boxes;
+mod check;
+mod crossing;
+mod findings;
 mod judge;
 mod kinds;
+mod local_ray;
 mod placement;
 mod queries;
 mod ray_text;
@@ -15,41 +19,18 @@ mod watertight;
 
 use rayon::prelude::*;
 
-pub use judge::{BOUND, Candidate, Judge, Truth};
-pub use kinds::{Kind, RaySource};
-pub use queries::{Answer, Answers, Ask, Query, packets};
+use crate::scene::{Camera, Scene};
+use kinds::RaySource;
+use queries::BLOCK;
+
+pub use check::check_rays;
+pub use findings::{Checked, Class, Counts, Unexplained};
+pub use judge::{Judge, Truth};
+pub use queries::{Answer, Answers, Query, RayQueries, Subject};
 pub use ray_text::{RayTextError, from_text, to_text};
 pub use replay::{Replay, replay};
-pub use report::{Class, Counts, KindCounts, Report, Unexplained};
+pub use report::{KindCounts, Report};
 pub use watertight::{Escapes, Watertightness, watertightness};
-
-use crate::accel::{Hit, Ray};
-use crate::scene::{Camera, Scene};
-
-/// Rays that are made and asked about together, all of one kind.
-const BLOCK: u64 = 4096;
-
-/// Rays that are asked about in one go, in all forms of query: what the first reads of a tree is still in the
-/// processor's cache for the others.
-const GROUP: usize = 64;
-
-/// Of the rays that all agree about, one in so many is judged nevertheless.
-const AUDIT: usize = 16;
-
-/// Unexplained disagreements that are kept, of each block and in all.
-const KEPT: usize = 20;
-
-/// Distances that differ by less are equal without a judge: two roundings.
-const NEGLIGIBLE: f32 = 2.0 * f32::EPSILON;
-
-/// A backend under test.
-#[derive(Clone, Copy)]
-pub struct Subject<'a> {
-    /// Name in tables.
-    pub name: &'a str,
-    /// The backend.
-    pub accel: &'a dyn Ask,
-}
 
 /// How much is checked.
 #[derive(Clone, Copy, Debug)]
@@ -60,10 +41,10 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Asks all subjects about rays of all kinds, in all forms of query, on rayon's threads.
+/// Traces rays of all kinds with all subjects, in all forms of query, on rayon's threads.
 ///
-/// The first subject's nearest hits of single rays are what all answers are compared with. The report depends on
-/// scene and options alone. `progress` hears of every block, with the number of rays in it.
+/// The first subject's closest hits of single rays are what all answers are compared with. The report depends on
+/// scene and options alone. `progress` receives the number of rays of every block that is done.
 pub fn crosscheck(
     scene: &Scene,
     cameras: &[Camera],
@@ -72,7 +53,7 @@ pub fn crosscheck(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Report {
     let names = subjects.iter().map(|subject| subject.name.to_owned()).collect();
-    let mut report = Report::new(names, options);
+    let mut report = Report::new(names, options.seed);
     let Some(first) = subjects.first() else { return report };
     let judge = Judge::new(scene);
     let source = RaySource::new(scene, cameras, first.accel, options.seed);
@@ -90,166 +71,4 @@ pub fn crosscheck(
         report.add(kind, block);
     }
     report
-}
-
-/// What came of some rays.
-#[derive(Clone, Debug, Default)]
-pub struct Checked {
-    /// How many rays there were.
-    pub rays: u64,
-    /// Rays judged without a disagreement.
-    pub audited: u64,
-    /// Largest difference of distances over what the bound allows, among hits of one triangle that were judged.
-    pub worst: f64,
-    /// By subject.
-    pub counts: Vec<Counts>,
-    /// The first disagreements that nothing explains.
-    pub unexplained: Vec<Unexplained>,
-}
-
-/// An answer that differs from the reference's.
-struct Disagreement {
-    /// Which ray of the group.
-    ray: usize,
-    subject: usize,
-    query: Query,
-    /// `None` where a lane answered that was switched off.
-    answer: Option<Answer>,
-}
-
-/// Asks all subjects about some rays and judges what they disagree about.
-pub fn check_rays(judge: &Judge, subjects: &[Subject], rays: &[Ray]) -> Checked {
-    let counts = vec![Counts::default(); subjects.len()];
-    let mut checked = Checked { rays: rays.len() as u64, counts, ..Checked::default() };
-    for (number, rays) in rays.chunks(GROUP).enumerate() {
-        check_group(judge, subjects, number, rays, &mut checked);
-    }
-    checked
-}
-
-fn check_group(judge: &Judge, subjects: &[Subject], group: usize, rays: &[Ray], checked: &mut Checked) {
-    let mut reference: Vec<Option<Hit>> = Vec::new();
-    let mut disagreements = Vec::new();
-    for (subject, Subject { accel, .. }) in subjects.iter().enumerate() {
-        for query in Query::all() {
-            let Answers { answers, strays } = accel.ask(query, group, rays);
-            if reference.is_empty() {
-                // The first subject's nearest hits of single rays.
-                reference = answers.iter().map(Answer::nearest).collect();
-            }
-            for (ray, (answer, reference)) in answers.iter().zip(&reference).enumerate() {
-                if !equal(answer, reference.as_ref()) {
-                    disagreements.push(Disagreement { ray, subject, query, answer: Some(*answer) });
-                }
-            }
-            let strays = strays.into_iter();
-            disagreements.extend(strays.map(|ray| Disagreement { ray, subject, query, answer: None }));
-        }
-    }
-    // Stable, so that the subjects stay in order.
-    disagreements.sort_by_key(|found| found.ray);
-
-    let mut left = disagreements.as_slice();
-    let mut classes = vec![Class::Agree; subjects.len()];
-    // Whether one of the subject's nearest hits that differ is in order.
-    let mut named = vec![false; subjects.len()];
-    // What has been said of the same ray already; most queries answer the same.
-    let mut judged: Vec<(Answer, Option<Class>)> = Vec::new();
-    for (index, (ray, reference)) in rays.iter().zip(&reference).enumerate() {
-        let (found, others) = left.split_at(left.partition_point(|found| found.ray == index));
-        left = others;
-        if found.is_empty() && index % AUDIT != 0 {
-            checked.counts.iter_mut().for_each(|counts| counts.add(Class::Agree));
-            continue;
-        }
-        checked.audited += u64::from(found.is_empty());
-        let truth = judge.truth(ray);
-        classes.fill(Class::Agree);
-        named.fill(false);
-        judged.clear();
-        let mut complain = |subject: usize, query: Query, answer: Option<Answer>| {
-            if checked.unexplained.len() < KEPT {
-                let (start, packet, _) = packets(query.width, group, rays)
-                    .find(|(start, packet, _)| (*start..*start + packet.len()).contains(&index))
-                    .unwrap_or((0, rays, crate::accel::Coherence::Coherent));
-                checked.unexplained.push(Unexplained {
-                    backend: subjects[subject].name.to_owned(),
-                    query,
-                    answer,
-                    reference: *reference,
-                    truth,
-                    ray: *ray,
-                    packet: packet.to_vec(),
-                    lane: index - start,
-                });
-            }
-        };
-        if !judge.admits_nearest(ray, &truth, reference.as_ref()) {
-            classes[0] = Class::Unexplained;
-            let query = Query { occlusion: false, width: 1 };
-            complain(0, query, Some(Answer::Nearest(*reference)));
-        }
-        for Disagreement { subject, query, answer, .. } in found {
-            let class = answer.and_then(|answer| {
-                if let Some((_, class)) = judged.iter().find(|(known, _)| *known == answer) {
-                    return *class;
-                }
-                let class = admits(judge, ray, &truth, &answer)
-                    .then(|| explained(judge, ray, &answer, reference.as_ref(), &mut checked.worst));
-                judged.push((answer, class));
-                class
-            });
-            // What stands in the way is named by the nearest hits, which came first. If the truth knows of nothing
-            // there, it is seen edge-on from afar.
-            named[*subject] |= class.is_some() && matches!(answer, Some(Answer::Nearest(Some(_))));
-            let edge_on = *answer == Some(Answer::Occluded(true)) && named[*subject];
-            let class = class.or(edge_on.then_some(Class::InPlane));
-            // The first query that fails tells enough.
-            if class.is_none() && classes[*subject] != Class::Unexplained {
-                complain(*subject, *query, *answer);
-            }
-            classes[*subject] = classes[*subject].max(class.unwrap_or(Class::Unexplained));
-        }
-        checked.counts.iter_mut().zip(&classes).for_each(|(counts, class)| counts.add(*class));
-    }
-}
-
-/// Whether an answer is the reference's, as far as single precision can tell.
-fn equal(answer: &Answer, reference: Option<&Hit>) -> bool {
-    match (answer, reference) {
-        (Answer::Nearest(Some(a)), Some(b)) => {
-            let same = (a.instance, a.triangle) == (b.instance, b.triangle);
-            same && (a.t - b.t).abs() <= NEGLIGIBLE * a.t.abs()
-        }
-        (answer, reference) => answer.is_hit() == reference.is_some(),
-    }
-}
-
-fn admits(judge: &Judge, ray: &Ray, truth: &Truth, answer: &Answer) -> bool {
-    match answer {
-        Answer::Nearest(hit) => judge.admits_nearest(ray, truth, hit.as_ref()),
-        Answer::Occluded(occluded) => Judge::admits_occlusion(truth, *occluded),
-    }
-}
-
-/// What kind of difference it is that has an explanation.
-fn explained(judge: &Judge, ray: &Ray, answer: &Answer, reference: Option<&Hit>, worst: &mut f64) -> Class {
-    let candidate = |hit: &Hit| judge.test(ray, hit.instance, hit.triangle);
-    let Answer::Nearest(Some(a)) = answer else { return Class::Graze };
-    let Some(first) = candidate(a) else { return Class::Graze };
-    if !first.is_near(f64::from(a.t)) {
-        return Class::InPlane;
-    }
-    let Some((b, second)) = reference.and_then(|b| Some((b, candidate(b)?))) else { return Class::Graze };
-    if !second.is_near(f64::from(b.t)) {
-        return Class::InPlane;
-    }
-    if (a.instance, a.triangle) == (b.instance, b.triangle) {
-        let off = (f64::from(a.t) - first.t).abs().max((f64::from(b.t) - first.t).abs());
-        if !first.in_plane {
-            *worst = worst.max(off / first.error);
-        }
-        return Class::Agree;
-    }
-    if (first.t - second.t).abs() <= first.error + second.error { Class::Tie } else { Class::Graze }
 }

@@ -2,9 +2,9 @@
 
 use glam::{Affine3A, DMat3, DVec3};
 
-use super::judge::{BOUND, LocalRay};
-use crate::accel::{Ray, largest_coordinate_of};
-use crate::scene::Bounds;
+use super::local_ray::{BOUND, LocalRay};
+use crate::accel::largest_coordinate_of;
+use crate::scene::{Bounds, Ray};
 
 /// Where an instance's triangles are.
 #[derive(Clone, Debug)]

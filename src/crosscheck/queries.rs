@@ -1,22 +1,29 @@
-//! The queries of a backend, and how they are asked.
+//! The forms of ray query, and how lists of rays are put through them.
 
-use super::GROUP;
-use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::scene::{Hit, Ray};
+
+/// Rays that are made and traced together, all of one kind.
+pub const BLOCK: u64 = 4096;
+
+/// Rays that are traced in one go, in all forms of query: what the first reads of a tree is still in the
+/// processor's cache for the others.
+pub const GROUP: usize = 64;
 
 /// Rays per packet; 1 for single rays.
 pub const WIDTHS: [usize; 4] = [1, 4, 8, 16];
 
-/// One way to ask a backend.
+/// A form of ray query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Query {
-    /// Whether anything is on the ray, or else what comes first.
+    /// Whether the query is for any hit, or else for the closest one.
     pub occlusion: bool,
     /// One of 1, 4, 8 and 16.
     pub width: usize,
 }
 
 impl Query {
-    /// All ways.
+    /// All forms.
     pub fn all() -> impl Iterator<Item = Self> {
         [false, true].into_iter().flat_map(|occlusion| WIDTHS.map(|width| Self { occlusion, width }))
     }
@@ -24,7 +31,7 @@ impl Query {
 
 impl std::fmt::Display for Query {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let what = if self.occlusion { "occlusion" } else { "nearest hit" };
+        let what = if self.occlusion { "occlusion" } else { "closest hit" };
         match self.width {
             1 => write!(f, "{what}, single ray"),
             width => write!(f, "{what}, packet of {width}"),
@@ -32,28 +39,28 @@ impl std::fmt::Display for Query {
     }
 }
 
-/// What a backend says.
+/// What a query reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
-    /// Of a nearest-hit query.
-    Nearest(Option<Hit>),
+    /// Of a closest-hit query.
+    Closest(Option<Hit>),
     /// Of an occlusion query.
     Occluded(bool),
 }
 
 impl Answer {
-    /// The hit, if it tells one.
-    pub(super) fn nearest(&self) -> Option<Hit> {
+    /// The hit of a closest-hit query.
+    pub(super) fn closest(&self) -> Option<Hit> {
         match self {
-            Self::Nearest(hit) => *hit,
+            Self::Closest(hit) => *hit,
             Self::Occluded(_) => None,
         }
     }
 
-    /// Whether it speaks of a hit.
+    /// Whether it reports a hit.
     pub fn is_hit(&self) -> bool {
         match self {
-            Self::Nearest(hit) => hit.is_some(),
+            Self::Closest(hit) => hit.is_some(),
             Self::Occluded(occluded) => *occluded,
         }
     }
@@ -68,25 +75,25 @@ pub struct Answers {
     pub strays: Vec<usize>,
 }
 
-/// An [`Accel`] whose type is forgotten.
-pub trait Ask: Send + Sync {
-    /// Asks about all rays, in [`packets`].
-    fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers;
-    /// The nearest hit of one ray.
-    fn nearest(&self, ray: &Ray) -> Option<Hit>;
+/// All queries of an [`Accel`], as an object whose type is not known at compile time.
+pub trait RayQueries: Send + Sync {
+    /// The answers to all rays, traced in [`packets`].
+    fn trace(&self, query: Query, group: usize, rays: &[Ray]) -> Answers;
+    /// The closest hit of one ray.
+    fn closest(&self, ray: &Ray) -> Option<Hit>;
 }
 
-impl<A: Accel> Ask for A {
-    fn ask(&self, query: Query, group: usize, rays: &[Ray]) -> Answers {
+impl<A: Accel> RayQueries for A {
+    fn trace(&self, query: Query, group: usize, rays: &[Ray]) -> Answers {
         match (query.occlusion, query.width) {
-            (false, 4) => nearest::<A, 4>(self, group, rays),
-            (false, 8) => nearest::<A, 8>(self, group, rays),
-            (false, 16) => nearest::<A, 16>(self, group, rays),
+            (false, 4) => closest::<A, 4>(self, group, rays),
+            (false, 8) => closest::<A, 8>(self, group, rays),
+            (false, 16) => closest::<A, 16>(self, group, rays),
             (true, 4) => occlusion::<A, 4>(self, group, rays),
             (true, 8) => occlusion::<A, 8>(self, group, rays),
             (true, 16) => occlusion::<A, 16>(self, group, rays),
             (false, _) => {
-                let answers = rays.iter().map(|ray| Answer::Nearest(self.intersect(ray)));
+                let answers = rays.iter().map(|ray| Answer::Closest(self.intersect(ray)));
                 Answers { answers: answers.collect(), strays: Vec::new() }
             }
             (true, _) => {
@@ -96,9 +103,18 @@ impl<A: Accel> Ask for A {
         }
     }
 
-    fn nearest(&self, ray: &Ray) -> Option<Hit> {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.intersect(ray)
     }
+}
+
+/// A backend under test.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// Name in tables.
+    pub name: &'a str,
+    /// The backend.
+    pub accel: &'a dyn RayQueries,
 }
 
 /// Cuts rays into packets of `width`, every eighth of them partly filled as the last ones of a list are, with
@@ -124,13 +140,13 @@ fn active(rays: &[Ray]) -> LaneMask {
     (1 << rays.len()) - 1
 }
 
-fn nearest<A: Accel, const N: usize>(accel: &A, group: usize, rays: &[Ray]) -> Answers {
+fn closest<A: Accel, const N: usize>(accel: &A, group: usize, rays: &[Ray]) -> Answers {
     let mut answers = Answers { answers: Vec::with_capacity(rays.len()), strays: Vec::new() };
     for (first, rays, coherence) in packets(N, group, rays) {
         let mut packet = RayHitPacket::<N>::empty();
         (0..N).for_each(|lane| packet.set_lane(lane, rays.get(lane).unwrap_or(&rays[0])));
         accel.intersect_packet(active(rays), &mut packet, coherence);
-        answers.answers.extend((0..rays.len()).map(|lane| Answer::Nearest(hit_of_lane(&packet, lane))));
+        answers.answers.extend((0..rays.len()).map(|lane| Answer::Closest(hit_of_lane(&packet, lane))));
         if (rays.len()..N).any(|lane| hit_of_lane(&packet, lane).is_some()) {
             answers.strays.push(first);
         }

@@ -2,18 +2,17 @@
 
 use std::fmt;
 
+use super::check::check_rays;
+use super::findings::{Checked, describe};
 use super::judge::{Candidate, Judge};
-use super::queries::Query;
+use super::queries::{GROUP, Query, Subject};
 use super::ray_text::to_text;
-use super::report::describe;
-use super::{Checked, GROUP, Subject, check_rays};
-use crate::accel::Ray;
-use crate::scene::Scene;
+use crate::scene::{Ray, Scene};
 
 /// Candidates that are listed.
 const LISTED: usize = 16;
 
-/// What all backends and the judge say about some rays.
+/// What all backends and the judge report about some rays.
 pub struct Replay {
     rays: Vec<ReplayedRay>,
     checked: Checked,
@@ -27,7 +26,7 @@ struct ReplayedRay {
     candidates: Vec<Candidate>,
 }
 
-/// Asks about the rays, which follow each other in packets as they were given.
+/// Traces the rays, which follow each other in packets as they were given.
 pub fn replay(scene: &Scene, subjects: &[Subject], rays: &[Ray]) -> Replay {
     let judge = Judge::new(scene);
     let mut replayed: Vec<_> = rays
@@ -48,7 +47,7 @@ pub fn replay(scene: &Scene, subjects: &[Subject], rays: &[Ray]) -> Replay {
         for query in Query::all() {
             let groups = rays.chunks(GROUP).zip(replayed.chunks_mut(GROUP)).enumerate();
             for (number, (rays, replayed)) in groups {
-                let answers = subject.accel.ask(query, number, rays).answers;
+                let answers = subject.accel.trace(query, number, rays).answers;
                 for (replayed, answer) in replayed.iter_mut().zip(&answers) {
                     replayed.answers.push((subject.name.to_owned(), query, describe(answer)));
                 }
@@ -69,7 +68,6 @@ impl fmt::Display for Replay {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for ReplayedRay { ray, answers, truth, candidates } in &self.rays {
             writeln!(f, "ray {}", to_text(ray))?;
-            writeln!(f, "  {ray:?}")?;
             for (backend, query, answer) in answers {
                 writeln!(f, "  {backend}, {query}: {answer}")?;
             }

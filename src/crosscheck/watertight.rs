@@ -6,11 +6,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::queries::{Ask, Query};
-use super::{BLOCK, GROUP, Subject};
-use crate::accel::Ray;
-use crate::scene::Scene;
+use super::queries::{BLOCK, GROUP, Query, RayQueries, Subject};
 use crate::scene::random::SplitMix64;
+use crate::scene::{Ray, Scene};
 
 /// Of this many rays one may escape.
 const GOAL: u64 = 10_000_000;
@@ -35,7 +33,7 @@ pub struct Escapes {
     pub backend: String,
     /// What was aimed at.
     pub aim: &'static str,
-    /// Rays, each of them asked about in every form of query.
+    /// Rays, each of them traced in every form of query.
     pub rays: u64,
     /// Rays that escaped from one of the queries at least.
     pub escaped: u64,
@@ -126,20 +124,20 @@ pub fn watertightness(
     Watertightness { rows }
 }
 
-fn distance_to_walls(accel: &dyn Ask, inside: Vec3) -> f32 {
+fn distance_to_walls(accel: &dyn RayQueries, inside: Vec3) -> f32 {
     let mut random = SplitMix64::new(1);
     let hits = (0..PROBES).filter_map(|_| {
         let ray = Ray::new(inside, in_ball(&mut random).normalize_or(Vec3::X));
-        accel.nearest(&ray).map(|hit| hit.t)
+        accel.closest(&ray).map(|hit| hit.t)
     });
     Some(hits.fold(f32::INFINITY, f32::min)).filter(|t| t.is_finite()).unwrap_or(0.0)
 }
 
-fn count_escapes(accel: &dyn Ask, rays: &[Ray]) -> u64 {
+fn count_escapes(accel: &dyn RayQueries, rays: &[Ray]) -> u64 {
     let of_group = |(number, rays): (usize, &[Ray])| {
         let mut escaped = [false; GROUP];
         for query in Query::all() {
-            for (escaped, answer) in escaped.iter_mut().zip(accel.ask(query, number, rays).answers) {
+            for (escaped, answer) in escaped.iter_mut().zip(accel.trace(query, number, rays).answers) {
                 *escaped |= !answer.is_hit();
             }
         }

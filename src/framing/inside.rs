@@ -48,13 +48,8 @@ pub fn best_view<A: Accel>(probe: &Probe<A>, eyes: &[Vec3], aspect: f32) -> Opti
     let (_, eye, column) = views.reduce(|best, other| if other.0 > best.0 { other } else { best })?;
     let forward = direction(column);
     let distance = probe.look(eye, forward).map_or(probe.diagonal(), |sight| sight.distance);
-    Some(Camera {
-        name: "default".to_owned(),
-        position: eye,
-        look_at: eye + forward * distance.max(1e-3 * probe.diagonal()),
-        up: Vec3::Y,
-        vertical_fov: FOV,
-    })
+    let target = eye + forward * distance.max(1e-3 * probe.diagonal());
+    Some(Camera::look_at(eye, target).with_fov(FOV).named("default"))
 }
 
 /// Sums over the rays of a column of what they add, and of its squares.

@@ -46,7 +46,7 @@ pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<PointLigh
         let Some((1.., lamp)) = best else { break };
         dark.retain(|&position| !lights(lamp, position));
         // An illuminance of 3 at the end of the reach; the exposure follows from the picture.
-        lamps.push(PointLight::new(lamp, Vec3::splat(3.0 * reach * reach)));
+        lamps.push(PointLight::point(lamp, Vec3::splat(3.0 * reach * reach)));
     }
     lamps
 }
@@ -57,7 +57,7 @@ const WEAKER: f32 = 0.125;
 /// Adds a weak lamp at the camera, so that nothing in view stays black.
 pub fn with_one_at(camera: &Camera, mut lamps: Vec<PointLight>) -> Vec<PointLight> {
     if let Some(lamp) = lamps.first() {
-        lamps.push(PointLight::new(camera.position, lamp.intensity * WEAKER));
+        lamps.push(PointLight::point(camera.position, lamp.intensity * WEAKER));
     }
     lamps
 }

@@ -10,17 +10,45 @@ mod outside;
 mod probe;
 
 use self::probe::Probe;
-use crate::accel::{Accel, Backend};
+use crate::accel::{Accel, Backend, with_accel};
 use crate::scene::load::OpenedScene;
 use crate::scene::{Camera, PointLight};
-use crate::with_accel;
 
-/// Gives a scene without a camera one, and a bare model without lights some; says so in [`OpenedScene::choices`].
-pub fn complete_view(opened: &mut OpenedScene, backend: &Backend) {
-    let OpenedScene { loaded, choices, bare } = opened;
+/// What is chosen for a scene that lacks a camera or lights; nothing for one that lacks neither.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChosenView {
+    /// The camera of a scene without one.
+    pub camera: Option<Camera>,
+    /// The lights of a bare model without lights.
+    pub lights: Vec<PointLight>,
+    /// Whether the view shows anything only if camera rays pass through the backs of all materials.
+    pub cull: bool,
+    /// What was chosen, in words.
+    pub choices: Vec<String>,
+}
+
+impl ChosenView {
+    /// The scene with the choices in their places, and in [`OpenedScene::choices`]. Geometry and alpha masks stay as they
+    /// are, so that an acceleration structure built before serves the completed scene too.
+    pub fn complete(self, mut opened: OpenedScene) -> OpenedScene {
+        let OpenedScene { loaded, choices, .. } = &mut opened;
+        loaded.cameras.extend(self.camera);
+        loaded.scene.lights.extend(self.lights);
+        if self.cull {
+            loaded.scene.materials.iter_mut().for_each(|material| material.cull = true);
+        }
+        choices.extend(self.choices);
+        opened
+    }
+}
+
+/// Chooses a camera for a scene without one, and lights for a bare model without lights; `backend` must hold the scene.
+pub fn choose_view(opened: &OpenedScene, backend: &Backend) -> ChosenView {
+    let OpenedScene { loaded, bare, .. } = opened;
     let lacks_lights = *bare && loaded.scene.lights.is_empty();
     let (width, height) = loaded.settings.resolution;
     let aspect = width as f32 / height as f32;
+    let mut chosen = ChosenView::default();
     if loaded.cameras.is_empty() {
         let view = with_accel!(backend, accel => {
             let probe = Probe { accel, scene: &loaded.scene, bounds: loaded.scene.bounds() };
@@ -28,26 +56,25 @@ pub fn complete_view(opened: &mut OpenedScene, backend: &Backend) {
             let can_cull = *bare && loaded.scene.materials.iter().all(|material| !material.two_sided);
             choose(&probe, aspect, can_cull)
         });
-        choices.push(format!("no camera in the file: {}", view.how));
-        loaded.cameras.push(view.camera);
-        if view.cut_open {
-            loaded.scene.materials.iter_mut().for_each(|material| material.cull = true);
-        }
+        chosen.choices.push(format!("no camera in the file: {}", view.how));
+        chosen.camera = Some(view.camera);
+        chosen.cull = view.cut_open;
         if lacks_lights && !view.lamps.is_empty() {
-            choices.push(format!("no lights in the file: {} lamps in its rooms", view.lamps.len()));
-            loaded.scene.lights = view.lamps;
-            return;
+            chosen.choices.push(format!("no lights in the file: {} lamps in its rooms", view.lamps.len()));
+            chosen.lights = view.lamps;
+            return chosen;
         }
     }
-    if let Some(camera) = loaded.cameras.first()
+    if let Some(camera) = chosen.camera.as_ref().or(loaded.cameras.first())
         && lacks_lights
     {
-        loaded.scene.lights = lamps::directional(camera);
-        choices.push(format!("no lights in the file: {} directional ones", loaded.scene.lights.len()));
+        chosen.lights = lamps::directional(camera);
+        chosen.choices.push(format!("no lights in the file: {} directional ones", chosen.lights.len()));
     }
+    chosen
 }
 
-/// What was chosen.
+/// A camera and what goes with it.
 struct View {
     camera: Camera,
     /// In words.
@@ -70,7 +97,7 @@ const BACKS_ONLY: f32 = 0.9;
 /// Rooms that no view from inside tells much about: no position sees this share of the others.
 const SEEN_AT_ONCE: f32 = 0.5;
 
-/// `can_cull`: whether rays of sight may be let through the backs of all materials.
+/// `can_cull`: whether camera rays may be let through the backs of all materials.
 fn choose<A: Accel>(probe: &Probe<A>, aspect: f32, can_cull: bool) -> View {
     let front = outside::from_the_front(probe, aspect);
     let from_outside = |camera, how| View { camera, how, cut_open: false, lamps: Vec::new() };

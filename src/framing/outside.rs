@@ -7,8 +7,7 @@ use glam::{Quat, Vec2, Vec3};
 use super::probe::{Probe, Sight};
 use crate::accel::Accel;
 use crate::light_mesh::SphereStrata;
-use crate::render::CameraRays;
-use crate::scene::{Bounds, Camera};
+use crate::scene::{Bounds, Camera, CameraRays};
 
 /// Vertical field of view, degrees.
 const FOV: f32 = 40.0;
@@ -133,11 +132,5 @@ fn fitting(center: Vec3, points: impl Iterator<Item = Vec3>, direction: Vec3, as
     });
     // A model of no extent is no model, but the camera must still look somewhere.
     let distance = distances.fold(0.0f32, f32::max).max(center.abs().max_element() * 1e-4).max(1e-6);
-    Camera {
-        name: "default".to_owned(),
-        position: center + back * distance,
-        look_at: center,
-        up: Vec3::Y,
-        vertical_fov: FOV,
-    }
+    Camera::look_at(center + back * distance, center).with_fov(FOV).named("default")
 }

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use crate::accel::{Accel, Ray};
+use crate::accel::Accel;
 use crate::light_mesh::SphereStrata;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, Interaction, LightShape, Scene};
+use crate::scene::{Bounds, Interaction, LightShape, Ray, Scene};
 
 /// A scene that rays can ask.
 pub struct Probe<'a, A> {

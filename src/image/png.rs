@@ -5,8 +5,9 @@ use std::borrow::Cow;
 use ::png::{BitDepth, ColorType, Compression, Decoder, Encoder, SrgbRenderingIntent, Transformations};
 use rayon::prelude::*;
 
-use super::tone::{linear_from_srgb, tone_map_8_bit};
+use super::tone::tone_map_8_bit;
 use super::{DecodeError, Image, MAX_PIXELS};
+use crate::color::linear_from_srgb;
 
 /// First bytes of every PNG file.
 pub(crate) const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];

@@ -4,10 +4,8 @@
 //! out as noise. So mesh points also send occlusion rays to points on the lamps. Each kind of ray counts with the share
 //! that it has in the density of both, the balance heuristic (Veach, 1997), so that the sum is eq. (4) still.
 
+use crate::scene::{Hit, Interaction, Scene, SurfacePoint};
 use glam::{Vec2, Vec3};
-
-use crate::accel::Hit;
-use crate::scene::{Interaction, Scene, SurfacePoint};
 
 /// The shining triangles of a scene.
 #[derive(Clone, Debug, Default)]
@@ -101,7 +99,7 @@ impl Emitters {
             at = Vec2::ONE - at;
         }
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        if mesh.cutout.as_ref().is_some_and(|opaque| !opaque(triangle, at.x, at.y)) {
+        if !scene.is_opaque(mesh, triangle, at.x, at.y) {
             return None;
         }
         let mut hit = Hit { t: 1.0, u: at.x, v: at.y, instance, triangle };
@@ -146,7 +144,6 @@ mod tests {
                 uvs: None,
                 colors: None,
                 materials: TriangleMaterials::Uniform(0),
-                cutout: None,
             })],
             instances: vec![Instance { mesh: 0, to_world: None }],
             materials: vec![Material { emission: Vec3::ONE, ..Material::default() }],

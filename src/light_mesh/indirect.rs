@@ -18,8 +18,8 @@ use super::patches::Patches;
 use super::points::{AUTO_SPACINGS, MeshError, MeshPoints};
 use super::sphere::{SphereStrata, noise};
 use super::store::{NeededPoints, PointMask};
-use crate::accel::{Accel, Coherence, Hit, LaneMask, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
-use crate::scene::{Interaction, Scene, SurfacePoint};
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::scene::{Hit, Interaction, Ray, Scene, SurfacePoint};
 use crate::settings::{IndirectForm, IndirectSettings, Leaks, Normalization};
 
 /// Rays that an evaluation traced.

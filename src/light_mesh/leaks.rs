@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::lanes::{LANES, VisibilityBits};
 use super::neighbours::Neighbours;
 use super::points::MeshPoints;
-use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayHitPacket, RayPacket, hit_of_lane};
-use crate::scene::{Scene, SurfacePoint};
+use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::scene::{Ray, Scene, SurfacePoint};
 
 /// Directions in which a mesh point looks for back faces: towards the faces and corners of a cube, turned so that
 /// none is parallel to axis-aligned walls.

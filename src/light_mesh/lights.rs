@@ -289,9 +289,9 @@ mod tests {
     #[test]
     fn illumination_matches_hand_computed_numbers() {
         let lights = [
-            PointLight::new(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
-            PointLight::new(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
-            PointLight::new(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
+            PointLight::point(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
+            PointLight::point(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
+            PointLight::point(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
         ];
         // φ2/φ1: linear 1/(1+2) and 0.5/(1+2); inverse square 1/4 and 0.5/4; none 1 and 0.5.
         for (falloff, expected) in [
@@ -309,7 +309,7 @@ mod tests {
     /// A light exactly at the lit point gives no NaN.
     #[test]
     fn a_light_at_the_point_is_finite() {
-        let light = PointLight::new(Vec3::ZERO, Vec3::ONE);
+        let light = PointLight::point(Vec3::ZERO, Vec3::ONE);
         for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
             let table = LightTable::new(&[light], falloff, 0.0);
             assert!(table.illuminate(&surface(), |_| Some([1.0; LANES])).is_finite());

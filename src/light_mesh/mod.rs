@@ -5,6 +5,7 @@ mod direct;
 pub mod directional;
 mod emitters;
 mod estimator;
+mod ids;
 mod indirect;
 mod lanes;
 mod lattice;

@@ -259,6 +259,34 @@ impl Neighbours {
     }
 }
 
+/// Search for the nearest point; ties go to the one offered first.
+pub(super) struct Nearest {
+    any: (f32, u64),
+    admitted: (f32, u64),
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self { any: (f32::INFINITY, 0), admitted: (f32::INFINITY, 0) }
+    }
+}
+
+impl Nearest {
+    pub(super) fn offer(&mut self, ball: &Ball, id: u64, position: Vec3) {
+        let distance = position.distance_squared(ball.center);
+        if distance < self.any.0 {
+            self.any = (distance, id);
+        }
+        if distance < self.admitted.0 && ball.admits(position) {
+            self.admitted = (distance, id);
+        }
+    }
+
+    pub(super) fn id(&self) -> u64 {
+        if self.admitted.0.is_finite() { self.admitted.1 } else { self.any.1 }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::ids::{LAYER_SHIFT, MOST_LAYERS, anchor, too_fine};
 use super::lattice::Lattice;
 use super::neighbours::{Ball, Neighbours};
 use super::scattered::ScatteredPoints;
@@ -30,6 +31,9 @@ pub enum MeshError {
     /// Spacing below what coordinates or point numbers can express.
     #[error("spacing {0} of the light mesh is too fine for a scene of this size")]
     TooFine(Vec3),
+    /// More different spacings than point numbers can tell apart.
+    #[error("the regions of the light mesh have {0} different spacings; at most {MOST_LAYERS} are possible")]
+    TooManySpacings(usize),
 }
 
 /// The positions of mesh points: one interface over all layouts.
@@ -50,25 +54,33 @@ macro_rules! with_set {
     };
 }
 
-/// Points for one part of space.
+/// All points of one spacing.
 struct Layer {
+    spacing: Vec3,
+    points: PointSet,
+    /// Id of its first point.
+    first_id: u64,
+}
+
+/// A part of space with points and a radius of its own.
+struct Zone {
     /// Where it holds; `None` for everywhere.
     bounds: Option<Bounds>,
-    points: PointSet,
+    /// Number of its layer.
+    layer: usize,
     radius: f32,
     /// The ball of this radius, around any point.
     ball: Ball,
     /// Side of the cubes whose surface points share a search for mesh points, and 1 over it; `None` where D_y is no
     /// ball, or where coordinates are so large that they hardly tell cubes apart.
     cubes: Option<(f32, f32)>,
-    /// Id of its first point; a multiple of 64.
-    first_id: u64,
 }
 
 /// Mesh points, their slots, and the shape of D_y.
 pub struct MeshPoints {
-    /// The whole scene first, then the regions: the last one that holds y decides.
     layers: Vec<Layer>,
+    /// The whole scene first, then the regions: the last one that holds y decides.
+    zones: Vec<Zone>,
     table: SlotTable,
     neighbourhood: Neighbourhood,
     hemisphere: bool,
@@ -88,32 +100,54 @@ const FARTHEST_CUBE: f32 = (1 << 20) as f32;
 pub const AUTO_SPACINGS: f32 = 120.0;
 
 impl Layer {
-    fn new(
-        bounds: Bounds,
-        region: Option<Bounds>,
-        settings: &PointSettings,
-        spacing: Vec3,
-        radius: f32,
-        first_id: u64,
-    ) -> Result<Self, MeshError> {
-        let tiled = |layout, seed| TiledPoints::new(bounds, spacing, radius, layout, seed);
-        let points = match &settings.layout {
-            PointLayout::List(positions) => PointSet::Scattered(ScatteredPoints::new(positions, radius)),
-            _ if Lattice::too_fine(bounds, spacing) => return Err(MeshError::TooFine(spacing)),
-            PointLayout::Regular => PointSet::Lattice(Lattice::new(bounds, spacing, radius)),
+    fn new(bounds: Bounds, layout: &PointLayout, spacing: Vec3, number: usize) -> Result<Self, MeshError> {
+        let anchor = anchor(bounds, spacing);
+        let tiled = |layout, seed| TiledPoints::new(anchor, spacing, layout, seed);
+        let points = match layout {
+            PointLayout::List(positions) => PointSet::Scattered(ScatteredPoints::new(positions)),
+            _ if too_fine(bounds, spacing) => return Err(MeshError::TooFine(spacing)),
+            PointLayout::Regular => PointSet::Lattice(Lattice::new(anchor, spacing)),
             PointLayout::BodyCentred => PointSet::Tiled(tiled(TileLayout::BodyCentred, 0)),
             PointLayout::Jittered { seed } => PointSet::Tiled(tiled(TileLayout::Jittered, *seed)),
             PointLayout::BlueNoise { seed } => PointSet::Tiled(tiled(TileLayout::BlueNoise, *seed)),
         };
-        let smooth = settings.neighbourhood == Neighbourhood::SmoothSphere;
-        let ball = Ball::new(Vec3::ZERO, None, radius, smooth);
+        Ok(Self { spacing, points, first_id: (number as u64) << LAYER_SHIFT })
+    }
+}
+
+impl Zone {
+    fn new(
+        bounds: Bounds,
+        region: Option<Bounds>,
+        neighbourhood: Neighbourhood,
+        layer: usize,
+        radius: f32,
+    ) -> Self {
+        let ball = Ball::new(Vec3::ZERO, None, radius, neighbourhood == Neighbourhood::SmoothSphere);
         let side = CUBE_SIDE * radius;
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element() / side;
-        let shared = settings.neighbourhood != Neighbourhood::Nearest
-            && (bounds.is_empty() || farthest < FARTHEST_CUBE);
-        let cubes = shared.then_some((side, 1.0 / side));
-        Ok(Self { bounds: region, points, radius, ball, cubes, first_id })
+        let shared =
+            neighbourhood != Neighbourhood::Nearest && (bounds.is_empty() || farthest < FARTHEST_CUBE);
+        Self { bounds: region, layer, radius, ball, cubes: shared.then_some((side, 1.0 / side)) }
     }
+}
+
+fn position(layers: &[Layer], id: u64) -> Vec3 {
+    let layer = &layers[(id >> LAYER_SHIFT) as usize];
+    with_set!(&layer.points, set => set.position(id - layer.first_id))
+}
+
+/// Slot of a known point of another layer at the position of a point.
+fn twin(layers: &[Layer], table: &SlotTable, id: u64) -> Option<u32> {
+    if layers.len() == 1 {
+        return None;
+    }
+    let at = position(layers, id);
+    let others = layers.iter().enumerate().filter(|(number, _)| *number as u64 != id >> LAYER_SHIFT);
+    let twins = others.filter_map(|(_, layer)| {
+        with_set!(&layer.points, set => set.id_at(at)).map(|id| layer.first_id + id)
+    });
+    twins.map(|id| table.slot(id)).find(|slot| *slot != UNKNOWN)
 }
 
 impl MeshPoints {
@@ -139,44 +173,65 @@ impl MeshPoints {
             Radius::Units(radius) => radius,
             Radius::Spacings(factor) => factor * spacing.max_element(),
         };
-        let mut layers = vec![Layer::new(bounds, None, settings, spacing, radius_for(spacing), 0)?];
-        let mut next_id =
-            |layer: &Layer| layer.first_id + with_set!(&layer.points, set => set.brick_count()) * 64;
+        let mut layers: Vec<Layer> = Vec::new();
+        let mut zone = |region: Option<Bounds>, spacing: Vec3, radius: f32| {
+            // Parts of space with the same spacing share their points; a list has no spacing at all.
+            let same =
+                |layer: &Layer| layer.spacing == spacing || matches!(settings.layout, PointLayout::List(_));
+            let known = layers.iter().position(same);
+            let layer = known.unwrap_or(layers.len());
+            if known.is_none() {
+                layers.push(Layer::new(bounds, &settings.layout, spacing, layer)?);
+            }
+            Ok(Zone::new(bounds, region, settings.neighbourhood, layer, radius))
+        };
+        let mut zones = vec![zone(None, spacing, radius_for(spacing))?];
         for region in &settings.regions {
             let spacing = region.spacing.unwrap_or(spacing);
             let radius = region.radius.unwrap_or_else(|| radius_for(spacing));
-            let first_id = layers.last().map_or(0, &mut next_id);
-            let layer = Layer::new(region.bounds, Some(region.bounds), settings, spacing, radius, first_id)?;
-            layers.push(layer);
+            zones.push(zone(Some(region.bounds), spacing, radius)?);
         }
-        let bricks = layers.last().map_or(0, next_id) / 64;
-        let total = layers.iter().map(|layer| with_set!(&layer.points, set => set.len())).sum();
-        Ok(Self {
+        if layers.len() > MOST_LAYERS {
+            return Err(MeshError::TooManySpacings(layers.len()));
+        }
+        let mut points = Self {
             layers,
-            table: SlotTable::new(bricks),
+            zones,
+            table: SlotTable::default(),
             neighbourhood: settings.neighbourhood,
             hemisphere: settings.hemisphere,
             leaks: settings.leaks,
-            counters: PointCounters { total, ..PointCounters::default() },
-        })
+            counters: PointCounters::default(),
+        };
+        points.counters.total = points.count_over(bounds);
+        Ok(points)
+    }
+
+    /// Number of points that neighbourhoods of surface points in the bounds can reach, of each spacing over the parts of space
+    /// that have it.
+    fn count_over(&self, bounds: Bounds) -> u64 {
+        if bounds.is_empty() {
+            return 0;
+        }
+        let count = |zone: &Zone| {
+            let of = zone.bounds.unwrap_or(bounds);
+            let reached = Bounds { min: of.min - zone.radius, max: of.max + zone.radius };
+            with_set!(&self.layers[zone.layer].points, set => set.count_in(reached))
+        };
+        self.zones.iter().map(count).sum()
     }
 
     /// R at a position.
     #[inline(always)]
     pub fn radius_at(&self, y: Vec3) -> f32 {
-        self.layer_at(y).radius
+        self.zones[self.zone_number_at(y)].radius
     }
 
     #[inline(always)]
-    fn layer_at(&self, y: Vec3) -> &Layer {
-        &self.layers[self.layer_number_at(y)]
-    }
-
-    #[inline(always)]
-    fn layer_number_at(&self, y: Vec3) -> usize {
+    fn zone_number_at(&self, y: Vec3) -> usize {
         let mut found = 0;
-        for (number, layer) in self.layers.iter().enumerate().skip(1) {
-            if layer.bounds.is_some_and(|bounds| bounds.contains(y)) {
+        for (number, zone) in self.zones.iter().enumerate().skip(1) {
+            if zone.bounds.is_some_and(|bounds| bounds.contains(y)) {
                 found = number;
             }
         }
@@ -188,8 +243,9 @@ impl MeshPoints {
     #[inline(never)]
     pub fn neighbours(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
         out.clear();
-        let layer = self.layer_at(surface.position);
-        let ball = self.ball_in(layer, surface);
+        let zone = &self.zones[self.zone_number_at(surface.position)];
+        let layer = &self.layers[zone.layer];
+        let ball = self.ball_in(zone, surface);
         with_set!(&layer.points, set => {
             if self.neighbourhood != Neighbourhood::Nearest {
                 set.gather(&ball, out);
@@ -265,21 +321,22 @@ impl MeshPoints {
         vicinity: &'a mut Vicinity,
         forget: impl FnMut(&Group),
     ) -> Option<(Ball, Surroundings<'a>)> {
-        let number = self.layer_number_at(surface.position);
-        let layer = &self.layers[number];
-        let (side, inverse) = layer.cubes?;
+        let number = self.zone_number_at(surface.position);
+        let zone = &self.zones[number];
+        let (side, inverse) = zone.cubes?;
         let place = (surface.position * inverse).floor();
         let cube = (number as u32, place.as_ivec3());
-        let around = vicinity.around(cube, |each| self.surround(layer, place, side, each), forget);
-        Some((self.ball_in(layer, surface), around))
+        let around = vicinity.around(cube, |each| self.surround(zone, place, side, each), forget);
+        Some((self.ball_in(zone, surface), around))
     }
 
     /// Calls `each(id, slot, position)` for the points that may lie in the ball of some point in a cube.
-    fn surround(&self, layer: &Layer, place: Vec3, side: f32, each: &mut dyn FnMut(u64, u32, Vec3)) {
+    fn surround(&self, zone: &Zone, place: Vec3, side: f32, each: &mut dyn FnMut(u64, u32, Vec3)) {
         let center = (place + 0.5) * side;
         // What rounding may add to R, generously.
-        let slack = 1e-4 * layer.radius + 16.0 * f32::EPSILON * center.abs().max_element();
-        let reach = layer.radius + slack;
+        let slack = 1e-4 * zone.radius + 16.0 * f32::EPSILON * center.abs().max_element();
+        let reach = zone.radius + slack;
+        let layer = &self.layers[zone.layer];
         let half = Vec3::splat(0.5 * side + reach);
         with_set!(&layer.points, set => set.for_each_in_box(center - half, center + half, |id, position| {
             let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
@@ -291,25 +348,24 @@ impl MeshPoints {
 
     /// Region of space whose points make up D_y of a surface point, unless the neighbourhood is the nearest point.
     pub fn ball(&self, surface: &SurfacePoint) -> Ball {
-        self.ball_in(self.layer_at(surface.position), surface)
+        self.ball_in(&self.zones[self.zone_number_at(surface.position)], surface)
     }
 
     #[inline(always)]
-    fn ball_in(&self, layer: &Layer, surface: &SurfacePoint) -> Ball {
+    fn ball_in(&self, zone: &Zone, surface: &SurfacePoint) -> Ball {
         let normal = self.hemisphere.then_some(surface.geometric_normal);
-        layer.ball.around(surface.position, normal)
+        zone.ball.around(surface.position, normal)
     }
 
     /// Position of a point.
     pub fn position(&self, id: u64) -> Vec3 {
-        let index = self.layers.partition_point(|layer| layer.first_id <= id).saturating_sub(1);
-        let layer = &self.layers[index];
-        with_set!(&layer.points, set => set.position(id - layer.first_id))
+        position(&self.layers, id)
     }
 
     /// Makes the needed points known; returns the positions of those that were not, in slot order.
     pub fn claim(&mut self, needed: &PointMask) -> Vec<Vec3> {
-        let new = self.table.claim(needed);
+        let layers = &self.layers;
+        let new = self.table.claim(needed, |table, id| twin(layers, table, id));
         self.counters.needed += needed.len();
         self.counters.evaluated += new.len() as u64;
         new.into_iter().map(|id| self.position(id)).collect()
@@ -330,7 +386,7 @@ impl MeshPoints {
 
     /// R outside of all regions, scene units.
     pub fn radius(&self) -> f32 {
-        self.layers[0].radius
+        self.zones[0].radius
     }
 
     /// Bytes held.

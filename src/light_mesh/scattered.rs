@@ -1,14 +1,19 @@
-//! Mesh points from a list: any positions, found through a grid of cells.
+//! Mesh points from a list: any positions, found through a grid of cells whose size follows from the points alone.
 
 use std::collections::HashMap;
 
 use glam::{I64Vec3, Vec3};
 
-use super::neighbours::{Ball, Neighbours};
-use super::tiled::Nearest;
+use super::neighbours::{Ball, Nearest, Neighbours};
 use crate::scene::Bounds;
 
-/// Mesh points at given positions (spec §8), for neighbourhoods of one radius.
+/// Mean number of points per cell that the cells' size aims at.
+const PER_CELL: f32 = 4.0;
+
+/// Cells along an axis at most.
+const MOST_CELLS: f32 = 1024.0;
+
+/// Mesh points at given positions (spec §8).
 #[derive(Clone, Debug)]
 pub struct ScatteredPoints {
     origin: Vec3,
@@ -22,13 +27,17 @@ pub struct ScatteredPoints {
 }
 
 impl ScatteredPoints {
-    /// Takes the positions (at least one, finite) for balls of radius `radius`.
-    pub fn new(positions: &[Vec3], radius: f32) -> Self {
+    /// Takes the positions (at least one, finite).
+    pub fn new(positions: &[Vec3]) -> Self {
         let mut bounds = Bounds::EMPTY;
         positions.iter().for_each(|&p| bounds.extend(p));
-        // Cells of R's size make a ball touch 27; not so small that their numbers overflow.
-        let smallest = bounds.extent().max_element() * 1e-6;
-        let inverse_cell = 1.0 / radius.max(smallest).max(f32::MIN_POSITIVE);
+        // Cells follow the points' density; of points in a plane or on a line, that along it.
+        let extent = bounds.extent();
+        let length = extent.max_element();
+        let share = (extent / length.max(f32::MIN_POSITIVE)).max(Vec3::splat(1.0 / MOST_CELLS));
+        let per_volume = positions.len() as f32 / (share.x * share.y * share.z * PER_CELL);
+        let cells = per_volume.cbrt().clamp(1.0, MOST_CELLS);
+        let inverse_cell = cells / length.max(f32::MIN_POSITIVE);
         let origin = if bounds.is_empty() { Vec3::ZERO } else { bounds.min };
         let cell_of = |p: Vec3| ((p - origin) * inverse_cell).floor().as_i64vec3();
         let mut points = positions.to_vec();
@@ -45,19 +54,19 @@ impl ScatteredPoints {
         Self { origin, inverse_cell, points, cells, first: I64Vec3::ZERO, last }
     }
 
-    /// Number of points.
-    pub fn len(&self) -> u64 {
-        self.points.len() as u64
+    /// Lists of points share none with other layouts.
+    pub fn id_at(&self, _: Vec3) -> Option<u64> {
+        None
     }
 
-    /// Number of bricks of 64 points.
-    pub fn brick_count(&self) -> u64 {
-        self.len().div_ceil(64)
+    /// Number of points in a box.
+    pub fn count_in(&self, bounds: Bounds) -> u64 {
+        self.points.iter().filter(|&&point| bounds.contains(point)).count() as u64
     }
 
     /// Position of a point.
     pub fn position(&self, id: u64) -> Vec3 {
-        self.points[id as usize]
+        self.points.get(id as usize).copied().unwrap_or_default()
     }
 
     #[inline(always)]
@@ -119,15 +128,15 @@ mod tests {
         let positions: Vec<Vec3> = (0..3000)
             .map(|_| (random.in_box(Vec3::ZERO, Vec3::ONE) - 0.5) * Vec3::new(40.0, 3.0, 9.0))
             .collect();
-        let set = ScatteredPoints::new(&positions, 0.7);
+        let set = ScatteredPoints::new(&positions);
         for _ in 0..200 {
             let center = (random.in_box(Vec3::ZERO, Vec3::ONE) - 0.5) * Vec3::new(44.0, 4.0, 10.0);
             let ball = Ball::new(center, Some(Vec3::Z), 0.7, false);
             let mut found = Neighbours::default();
             set.gather(&ball, &mut found);
             let found: HashSet<u64> = found.ids().iter().copied().collect();
-            let expected: HashSet<u64> =
-                (0..set.len()).filter(|&id| ball.weight(set.position(id)).is_some()).collect();
+            let inside = |&id: &u64| ball.weight(set.position(id)).is_some();
+            let expected: HashSet<u64> = (0..set.points.len() as u64).filter(inside).collect();
             assert_eq!(found, expected);
         }
     }

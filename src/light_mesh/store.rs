@@ -10,9 +10,6 @@ use std::hash::{BuildHasherDefault, Hasher};
 /// Marks a point that has no value yet: step 1 of the paper's algorithm.
 pub const UNKNOWN: u32 = u32::MAX;
 
-/// Dense tables up to this many bricks (4 bytes each); beyond, a hash map.
-const DENSE_BRICKS: u64 = 1 << 22;
-
 /// Multiplicative hashing of brick numbers, which are well spread already in their low bits.
 #[derive(Default)]
 struct BrickHasher(u64);
@@ -31,14 +28,11 @@ impl Hasher for BrickHasher {
     }
 }
 
-enum Directory {
-    Dense(Vec<u32>),
-    Sparse(HashMap<u64, u32, BuildHasherDefault<BrickHasher>>),
-}
-
 /// From point ids to slots.
+#[derive(Default)]
 pub struct SlotTable {
-    directory: Directory,
+    /// From bricks to their numbers in `bricks`.
+    directory: HashMap<u64, u32, BuildHasherDefault<BrickHasher>>,
     bricks: Vec<[u32; 64]>,
     used: u32,
 }
@@ -76,22 +70,9 @@ impl PointMask {
 }
 
 impl SlotTable {
-    /// Table for a point set of `bricks` bricks, all points unknown.
-    pub fn new(bricks: u64) -> Self {
-        let directory = if bricks <= DENSE_BRICKS {
-            Directory::Dense(vec![UNKNOWN; bricks as usize])
-        } else {
-            Directory::Sparse(HashMap::default())
-        };
-        Self { directory, bricks: Vec::new(), used: 0 }
-    }
-
     #[inline(always)]
     fn brick(&self, brick: u64) -> u32 {
-        match &self.directory {
-            Directory::Dense(table) => table[brick as usize],
-            Directory::Sparse(map) => map.get(&brick).copied().unwrap_or(UNKNOWN),
-        }
+        self.directory.get(&brick).copied().unwrap_or(UNKNOWN)
     }
 
     /// Slot of a point, or [`UNKNOWN`].
@@ -105,38 +86,37 @@ impl SlotTable {
 
     /// Gives slots to those points of the set that are unknown; returns their ids, whose slots follow
     /// each other after those given away before. From here on they count as known.
-    pub fn claim(&mut self, needed: &PointMask) -> Vec<u64> {
+    ///
+    /// `twin` may name another point at the same position: if that one is known, the two share its slot.
+    pub fn claim(&mut self, needed: &PointMask, twin: impl Fn(&Self, u64) -> Option<u32>) -> Vec<u64> {
         let mut new = Vec::new();
         for &(brick, mask) in &needed.0 {
             let mut entry = self.brick(brick);
             if entry == UNKNOWN {
                 entry = self.bricks.len() as u32;
                 self.bricks.push([UNKNOWN; 64]);
-                match &mut self.directory {
-                    Directory::Dense(table) => table[brick as usize] = entry,
-                    Directory::Sparse(map) => {
-                        map.insert(brick, entry);
-                    }
-                }
+                self.directory.insert(brick, entry);
             }
-            let slots = &mut self.bricks[entry as usize];
-            for (place, slot) in slots.iter_mut().enumerate() {
-                if mask >> place & 1 == 1 && *slot == UNKNOWN {
-                    *slot = self.used;
-                    self.used += 1;
-                    new.push(brick * 64 + place as u64);
+            for place in (0..64).filter(|place| mask >> place & 1 == 1) {
+                if self.bricks[entry as usize][place] != UNKNOWN {
+                    continue;
                 }
+                let id = brick * 64 + place as u64;
+                let slot = twin(self, id).unwrap_or_else(|| {
+                    new.push(id);
+                    self.used + new.len() as u32 - 1
+                });
+                self.bricks[entry as usize][place] = slot;
             }
         }
+        self.used += new.len() as u32;
         new
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        let directory = match &self.directory {
-            Directory::Dense(table) => table.capacity() * 4,
-            Directory::Sparse(map) => map.capacity() * 17,
-        };
+        // A hash map keeps a byte per place beside key and value.
+        let directory = self.directory.capacity() * (size_of::<(u64, u32)>() + 1);
         directory + self.bricks.capacity() * 256
     }
 }
@@ -212,18 +192,29 @@ mod tests {
     /// A known point is never given a second slot: "evaluated at most once" rests on this.
     #[test]
     fn a_point_is_claimed_once() {
-        for bricks in [1000, DENSE_BRICKS + 1] {
-            let mut table = SlotTable::new(bricks);
-            let first = PointMask::union([(3, 0b101), (900, 1 << 63), (3, 0b1)]);
-            assert_eq!(table.claim(&first), [192, 194, 900 * 64 + 63]);
-            let second = PointMask::union([(900, 3 << 62), (3, 0b111)]);
-            assert_eq!(table.claim(&second), [193, 900 * 64 + 62]);
-            assert_eq!(table.claim(&second), [] as [u64; 0]);
-            assert_eq!(table.slot(194), 1);
-            assert_eq!(table.slot(193), 3);
-            assert_eq!(table.slot(195), UNKNOWN);
-            assert_eq!(table.slot(64), UNKNOWN);
-        }
+        let mut table = SlotTable::default();
+        let first = PointMask::union([(3, 0b101), (900, 1 << 63), (3, 0b1)]);
+        assert_eq!(table.claim(&first, |_, _| None), [192, 194, 900 * 64 + 63]);
+        let second = PointMask::union([(900, 3 << 62), (3, 0b111)]);
+        assert_eq!(table.claim(&second, |_, _| None), [193, 900 * 64 + 62]);
+        assert_eq!(table.claim(&second, |_, _| None), [] as [u64; 0]);
+        assert_eq!(table.slot(194), 1);
+        assert_eq!(table.slot(193), 3);
+        assert_eq!(table.slot(195), UNKNOWN);
+        assert_eq!(table.slot(64), UNKNOWN);
+    }
+
+    /// A point whose twin is known takes its slot, and needs no value of its own; also where both come at once.
+    #[test]
+    fn twins_share_a_slot() {
+        let mut table = SlotTable::default();
+        let twin = |table: &SlotTable, id: u64| {
+            let slot = if id >= 640 { table.slot(id - 640) } else { UNKNOWN };
+            (slot != UNKNOWN).then_some(slot)
+        };
+        assert_eq!(table.claim(&PointMask::union([(1, 0b10)]), twin), [65]);
+        assert_eq!(table.claim(&PointMask::union([(1, 0b100), (11, 0b1110)]), twin), [66, 707]);
+        assert_eq!([705, 706, 707].map(|id| table.slot(id)), [0, 1, 2]);
     }
 
     /// The tile's table loses nothing when it grows.

@@ -3,14 +3,24 @@
 //! A tile of 8×8×8 spacings holds 512 (body-centred: 1,024) points and repeats along the axes, so that a set of any extent
 //! has arithmetic positions and lookups and takes no memory.
 
-use glam::{I64Vec3, Vec3};
+use glam::{IVec3, Vec3};
 
-use super::neighbours::{Ball, Neighbours};
+use super::ids::{Blocks, within_range};
+use super::neighbours::{Ball, Nearest, Neighbours};
 use crate::scene::Bounds;
 use crate::scene::random::SplitMix64;
 
 /// Edge of a tile in spacings.
-const EDGE: i64 = 8;
+const EDGE: i32 = 8;
+
+/// Tiles are the blocks that ids are made of.
+const TILES: Blocks = Blocks::new(EDGE.ilog2());
+
+/// Ids of a tile: as many as the layout with the most points has.
+const TILE_IDS: u64 = 2 * (EDGE * EDGE * EDGE) as u64;
+
+/// Boxes reach this much further when it comes to cells, in spacings: rounding may put points at cells' faces beyond them.
+const SLACK: f32 = 1.0 / 64.0;
 
 /// Repeating tile of mesh points. Distances inside the tile are in spacings.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +28,6 @@ pub struct TiledPoints {
     origin: Vec3,
     spacing: Vec3,
     inverse_spacing: Vec3,
-    tiles: I64Vec3,
     /// Positions within the tile, sorted by cell along a Morton curve: 64 in a row are neighbours.
     points: Vec<Vec3>,
     /// First point of each cell (x fastest), by the cell's own number; one more at the end of the curve.
@@ -37,90 +46,89 @@ pub enum TileLayout {
 }
 
 impl TiledPoints {
-    /// Points over `bounds` enlarged by `radius`.
-    pub fn new(bounds: Bounds, spacing: Vec3, radius: f32, layout: TileLayout, seed: u64) -> Self {
-        let bounds = if bounds.is_empty() { Bounds { min: Vec3::ZERO, max: Vec3::ZERO } } else { bounds };
-        let margin = (Vec3::splat(radius) / spacing).ceil().max(Vec3::ONE) + 1.0;
-        let origin = bounds.min - margin * spacing;
-        let cells = ((bounds.max - origin) / spacing + margin).ceil();
-        let tiles = (cells / EDGE as f32).ceil().as_i64vec3().max(I64Vec3::ONE);
+    /// Points with cells' corners at `origin` and every `spacing` (> 0, per axis) from there.
+    pub fn new(origin: Vec3, spacing: Vec3, layout: TileLayout, seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
         let mut points = match layout {
             TileLayout::BodyCentred => body_centred(),
             TileLayout::Jittered => jittered(&mut random),
             TileLayout::BlueNoise => blue_noise(&mut random),
         };
-        points.sort_by_key(|p| morton(p.as_i64vec3()));
+        points.sort_by_key(|p| morton(p.as_ivec3()));
         let cells = (0..EDGE * EDGE * EDGE)
             .map(|cell| {
-                let code = morton(I64Vec3::new(cell % EDGE, cell / EDGE % EDGE, cell / EDGE / EDGE));
-                let begin = points.partition_point(|p| morton(p.as_i64vec3()) < code);
-                let end = points.partition_point(|p| morton(p.as_i64vec3()) <= code);
+                let code = morton(IVec3::new(cell % EDGE, cell / EDGE % EDGE, cell / EDGE / EDGE));
+                let begin = points.partition_point(|p| morton(p.as_ivec3()) < code);
+                let end = points.partition_point(|p| morton(p.as_ivec3()) <= code);
                 (begin as u32, end as u32)
             })
             .collect();
-        Self { origin, spacing, inverse_spacing: spacing.recip(), tiles, points, cells }
+        Self { origin, spacing, inverse_spacing: spacing.recip(), points, cells }
     }
 
-    /// Number of points.
-    pub fn len(&self) -> u64 {
-        (self.tiles.x * self.tiles.y * self.tiles.z) as u64 * self.points.len() as u64
+    /// The point that lies exactly at a position, if there is one.
+    pub fn id_at(&self, position: Vec3) -> Option<u64> {
+        let mut found = None;
+        self.for_each_in_cells(self.cells_in(position, position), |id, x| {
+            found = if x == position { Some(id) } else { found };
+        });
+        found
     }
 
-    /// Number of bricks of 64 points.
-    pub fn brick_count(&self) -> u64 {
-        self.len().div_ceil(64)
+    /// About how many points a box holds.
+    pub fn count_in(&self, bounds: Bounds) -> u64 {
+        let cells = (bounds.extent() * self.inverse_spacing).as_dvec3();
+        let per_cell = self.points.len() as f64 / f64::from(EDGE * EDGE * EDGE);
+        (cells.x * cells.y * cells.z * per_cell) as u64
     }
 
     /// Position of a point.
     pub fn position(&self, id: u64) -> Vec3 {
-        let tile = (id / self.points.len() as u64) as i64;
-        let tile = I64Vec3::new(
-            tile % self.tiles.x,
-            tile / self.tiles.x % self.tiles.y,
-            tile / self.tiles.x / self.tiles.y,
-        );
-        self.at(tile, self.points[(id % self.points.len() as u64) as usize])
+        let point = self.points.get((id % TILE_IDS) as usize).copied().unwrap_or_default();
+        self.at(TILES.first_cell(id / TILE_IDS), point)
     }
 
     #[inline(always)]
-    fn at(&self, tile: I64Vec3, point: Vec3) -> Vec3 {
-        self.origin + ((tile * EDGE).as_vec3() + point) * self.spacing
+    fn at(&self, first_cell: IVec3, point: Vec3) -> Vec3 {
+        self.origin + (first_cell.as_vec3() + point) * self.spacing
     }
 
     /// Calls `each(id, position)` for the points in the cells from `first` to `last`.
     #[inline(always)]
-    fn for_each_in_cells(&self, first: I64Vec3, last: I64Vec3, mut each: impl FnMut(u64, Vec3)) {
-        let first = first.max(I64Vec3::ZERO);
-        let last = last.min(self.tiles * EDGE - 1);
+    fn for_each_in_cells(&self, (first, last): (IVec3, IVec3), mut each: impl FnMut(u64, Vec3)) {
         for z in first.z..=last.z {
             for y in first.y..=last.y {
                 for x in first.x..=last.x {
-                    let tile = I64Vec3::new(x / EDGE, y / EDGE, z / EDGE);
-                    let cell = (z % EDGE * EDGE + y % EDGE) * EDGE + x % EDGE;
-                    let base = (tile.z * self.tiles.y + tile.y) * self.tiles.x + tile.x;
-                    let (begin, end) = self.cells[cell as usize];
+                    let number = TILES.of(IVec3::new(x, y, z));
+                    let corner = TILES.first_cell(number);
+                    let [x, y, z] = [x - corner.x, y - corner.y, z - corner.z];
+                    let (begin, end) = self.cells[((z * EDGE + y) * EDGE + x) as usize];
                     for index in begin..end {
-                        let id = base as u64 * self.points.len() as u64 + u64::from(index);
-                        each(id, self.at(tile, self.points[index as usize]));
+                        let position = self.at(corner, self.points[index as usize]);
+                        each(number * TILE_IDS + u64::from(index), position);
                     }
                 }
             }
         }
     }
 
+    /// The cells of a box.
+    #[inline(always)]
+    fn cells_in(&self, min: Vec3, max: Vec3) -> (IVec3, IVec3) {
+        let place_of = |p: Vec3| (p - self.origin) * self.inverse_spacing;
+        within_range((place_of(min) - SLACK).floor(), (place_of(max) + SLACK).floor())
+    }
+
     /// Calls `each(id, position)` for all points of a box, and some beside it, in the order of [`gather`](Self::gather).
     pub fn for_each_in_box(&self, min: Vec3, max: Vec3, each: impl FnMut(u64, Vec3)) {
-        let cell_of = |p: Vec3| ((p - self.origin) * self.inverse_spacing).floor().as_i64vec3();
-        self.for_each_in_cells(cell_of(min), cell_of(max), each);
+        self.for_each_in_cells(self.cells_in(min, max), each);
     }
 
     /// The points of the ball, in a fixed order.
     #[inline(always)]
     pub fn gather(&self, ball: &Ball, out: &mut Neighbours) {
-        let first = ((ball.center - ball.radius - self.origin) * self.inverse_spacing).floor().as_i64vec3();
-        let last = ((ball.center + ball.radius - self.origin) * self.inverse_spacing).floor().as_i64vec3();
-        self.for_each_in_cells(first, last, |id, position| {
+        let cells = self.cells_in(ball.center - ball.radius, ball.center + ball.radius);
+        self.for_each_in_cells(cells, |id, position| {
             if let Some(weight) = ball.weight(position) {
                 out.push(id, weight);
             }
@@ -130,56 +138,28 @@ impl TiledPoints {
     /// The point nearest to the ball's centre among those that its half-space admits, or among all if it admits none
     /// nearby.
     pub fn nearest(&self, ball: &Ball) -> u64 {
-        let middle = ((ball.center - self.origin) * self.inverse_spacing).floor().as_i64vec3();
+        let middle = ((ball.center - self.origin) * self.inverse_spacing).floor();
         let mut nearest = Nearest::default();
         // No sphere of three spacings is empty in any of the layouts, in whatever half of it.
-        self.for_each_in_cells(middle - 3, middle + 3, |id, position| nearest.offer(ball, id, position));
+        let cells = within_range(middle - 3.0, middle + 3.0);
+        self.for_each_in_cells(cells, |id, position| nearest.offer(ball, id, position));
         nearest.id()
     }
 }
 
-/// Search for the nearest point; ties go to the one offered first.
-pub(super) struct Nearest {
-    any: (f32, u64),
-    admitted: (f32, u64),
-}
-
-impl Default for Nearest {
-    fn default() -> Self {
-        Self { any: (f32::INFINITY, 0), admitted: (f32::INFINITY, 0) }
-    }
-}
-
-impl Nearest {
-    pub(super) fn offer(&mut self, ball: &Ball, id: u64, position: Vec3) {
-        let distance = position.distance_squared(ball.center);
-        if distance < self.any.0 {
-            self.any = (distance, id);
-        }
-        if distance < self.admitted.0 && ball.admits(position) {
-            self.admitted = (distance, id);
-        }
-    }
-
-    pub(super) fn id(&self) -> u64 {
-        if self.admitted.0.is_finite() { self.admitted.1 } else { self.any.1 }
-    }
-}
-
-fn morton(cell: I64Vec3) -> u32 {
-    let cell = cell.clamp(I64Vec3::ZERO, I64Vec3::splat(EDGE - 1));
-    let spread = |v: i64| (0..3).fold(0, |code, bit| code | ((v as u32) >> bit & 1) << (3 * bit));
+fn morton(cell: IVec3) -> u32 {
+    let cell = cell.clamp(IVec3::ZERO, IVec3::splat(EDGE - 1));
+    let spread = |v: i32| (0..3).fold(0, |code, bit| code | ((v as u32) >> bit & 1) << (3 * bit));
     spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
 }
 
 fn cells() -> impl Iterator<Item = Vec3> {
-    (0..EDGE * EDGE * EDGE).map(|i| I64Vec3::new(i % EDGE, i / EDGE % EDGE, i / EDGE / EDGE).as_vec3())
+    (0..EDGE * EDGE * EDGE).map(|i| IVec3::new(i % EDGE, i / EDGE % EDGE, i / EDGE / EDGE).as_vec3())
 }
 
-/// Off the corner by an odd fraction, since surfaces lie at round ones (see the regular grid).
+/// The points of a spacing are among the corners of half of it.
 fn body_centred() -> Vec<Vec3> {
-    const PHASE: f32 = 0.222_136;
-    cells().flat_map(|cell| [cell + PHASE, cell + (PHASE + 0.5)]).collect()
+    cells().flat_map(|cell| [cell, cell + 0.5]).collect()
 }
 
 fn jittered(random: &mut SplitMix64) -> Vec<Vec3> {
@@ -216,13 +196,22 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    const BOUNDS: Bounds = Bounds { min: Vec3::new(-1.0, 0.0, 2.0), max: Vec3::new(3.0, 2.5, 4.0) };
+    /// All points of a box and around it.
+    fn points(set: &TiledPoints) -> Vec<(u64, Vec3)> {
+        let mut points = Vec::new();
+        set.for_each_in_box(Vec3::new(-3.0, -2.0, 0.0), Vec3::new(5.0, 4.5, 6.0), |id, position| {
+            points.push((id, position));
+        });
+        points
+    }
 
-    /// Lookup finds what a search through all points finds, in every layout.
+    /// Lookup finds what a search through all points finds, in every layout, and ids lead to their positions.
     #[test]
     fn lookups_equal_exhaustive_search() {
         for layout in [TileLayout::BodyCentred, TileLayout::Jittered, TileLayout::BlueNoise] {
-            let set = TiledPoints::new(BOUNDS, Vec3::new(0.5, 0.25, 0.4), 1.0, layout, 7);
+            let set = TiledPoints::new(Vec3::new(-0.9, 0.1, 2.2), Vec3::new(0.5, 0.25, 0.4), layout, 7);
+            let points = points(&set);
+            assert!(points.iter().all(|&(id, position)| set.position(id) == position));
             for (center, normal) in [
                 (Vec3::new(0.3, 1.1, 2.9), Vec3::Y),
                 (Vec3::new(-1.0, 0.0, 2.0), Vec3::Y),
@@ -232,16 +221,25 @@ mod tests {
                 let mut found = Neighbours::default();
                 set.gather(&ball, &mut found);
                 let found: HashSet<u64> = found.ids().iter().copied().collect();
-                let expected: HashSet<u64> =
-                    (0..set.len()).filter(|&id| ball.weight(set.position(id)).is_some()).collect();
+                let inside = |&&(_, x): &&(u64, Vec3)| ball.weight(x).is_some();
+                let expected: HashSet<u64> = points.iter().filter(inside).map(|&(id, _)| id).collect();
                 assert!(!found.is_empty());
                 assert_eq!(found, expected, "{layout:?}");
-                let nearest = (0..set.len())
-                    .filter(|&id| ball.admits(set.position(id)))
-                    .map(|id| set.position(id).distance(center))
-                    .fold(f32::INFINITY, f32::min);
+                let admitted = points.iter().filter(|&&(_, x)| ball.admits(x));
+                let nearest = admitted.map(|&(_, x)| x.distance(center)).fold(f32::INFINITY, f32::min);
                 assert_eq!(set.position(set.nearest(&ball)).distance(center), nearest, "{layout:?}");
             }
+        }
+    }
+
+    /// The body-centred points of a spacing are among those of half of it, to the bit, when both have the same origin.
+    #[test]
+    fn body_centred_points_of_half_the_spacing_contain_the_coarse_ones() {
+        let (origin, spacing) = (Vec3::new(-0.9, 0.1, 2.2), Vec3::new(0.5, 0.25, 0.4));
+        let set = |spacing| TiledPoints::new(origin, spacing, TileLayout::BodyCentred, 0);
+        let (coarse, fine) = (set(spacing), set(spacing * 0.5));
+        for (_, position) in points(&coarse) {
+            assert!(fine.id_at(position).is_some_and(|id| fine.position(id) == position), "{position}");
         }
     }
 

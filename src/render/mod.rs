@@ -1,7 +1,6 @@
 //! Rendering as a wavefront (spec §9): camera paths of an image block → needed mesh points → evaluation in
 //! packets → shading.
 
-mod camera_rays;
 mod conventional;
 mod hybrid;
 mod light_mesh;
@@ -12,18 +11,16 @@ mod surface_group;
 mod tiles;
 mod wavefront;
 
-pub use camera_rays::CameraRays;
 pub use stats::{MeshCounters, RayCounters, RenderStats, StageSeconds};
 
 use self::conventional::ConventionalIntegrator;
 use self::light_mesh::LightMeshIntegrator;
 use self::reference::ReferenceIntegrator;
 use self::wavefront::{direct_scale, wavefront};
-use crate::accel::Backend;
+use crate::accel::{Backend, with_accel};
 use crate::light_mesh::{DirectMesh, IndirectMesh, LightTable, MeshError};
 use crate::scene::{Camera, Scene};
 use crate::settings::{Integrator, Settings};
-use crate::with_accel;
 
 /// Linear RGB picture, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]

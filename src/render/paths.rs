@@ -2,10 +2,9 @@
 
 use glam::Vec3;
 
-use super::camera_rays::CameraRays;
 use super::tiles::Tile;
-use crate::accel::{Accel, Coherence, Hit, PacketLanes, Ray, RayHitPacket, hit_of_lane};
-use crate::scene::{Interaction, Scene, SurfacePoint};
+use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
+use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene, SurfacePoint};
 use crate::settings::Settings;
 
 /// A surface point on a camera path, and how much of its illumination reaches the pixel.

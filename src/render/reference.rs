@@ -6,12 +6,12 @@ use super::paths::{PathVertex, TilePaths};
 use super::stats::RenderStats;
 use super::tiles::Tile;
 use super::wavefront::{BlockIntegrator, ShadeCounters, direct_scale};
-use crate::accel::{Accel, Coherence, PacketLanes, Ray, RayPacket};
+use crate::accel::{Accel, Coherence, PacketLanes, RayPacket};
 use crate::light_mesh::{
     Ball, Basis, DirectValues, LANES, LightTable, MeshError, MeshPoints, directional, is_inside,
 };
 use crate::scene::random::SplitMix64;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Ray, Scene, SurfacePoint};
 use crate::settings::{Estimator, Leaks, Neighbourhood, Settings};
 
 /// Shades surface points with the means over D_y that a light mesh of infinite density would give.

@@ -5,14 +5,13 @@ use std::time::Instant;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::camera_rays::CameraRays;
 use super::paths::{PathVertex, TilePaths, trace_paths};
 use super::stats::{RenderStats, add_since};
 use super::tiles::{TILE, TILES_PER_TASK, Tile, blocks};
 use super::{Film, Progress};
 use crate::accel::Accel;
 use crate::light_mesh::PointMask;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, CameraRays, Scene};
 use crate::settings::Settings;
 
 /// What differs between the integrators: how the surface points of a block get their light.

@@ -60,9 +60,28 @@ impl LightShape {
 
 impl PointLight {
     /// A light that shines everywhere alike.
-    pub fn new(position: Vec3, intensity: Vec3) -> Self {
+    pub fn point(position: Vec3, intensity: Vec3) -> Self {
         Self { position, intensity, shape: LightShape::Point }
     }
+
+    /// A light that shines along `direction` (any length but 0): full up to the first of the angles of `cone` from there,
+    /// none beyond the second; degrees.
+    pub fn spot(position: Vec3, direction: Vec3, cone: [f32; 2], intensity: Vec3) -> Self {
+        let [inner_cosine, outer_cosine] = cone.map(|angle| angle.to_radians().cos());
+        let direction = unit(direction);
+        Self { position, intensity, shape: LightShape::Spot { direction, inner_cosine, outer_cosine } }
+    }
+
+    /// A light from infinitely far away that travels along `direction` (any length but 0).
+    pub fn directional(direction: Vec3, intensity: Vec3) -> Self {
+        let shape = LightShape::Directional { direction: unit(direction) };
+        Self { position: Vec3::ZERO, intensity, shape }
+    }
+}
+
+/// The direction of a vector, in double precision since squares of single ones may be 0 or infinite; 0 for 0.
+fn unit(vector: Vec3) -> Vec3 {
+    vector.as_dvec3().normalize_or_zero().as_vec3()
 }
 
 /// φ1(t), what intensities are divided by at distance t.

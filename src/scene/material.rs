@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::TextureMap;
+use super::{AlphaMask, TextureMap};
 
 /// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (spec §7).
 #[derive(Clone, Debug, PartialEq)]
@@ -19,10 +19,19 @@ pub struct Material {
     pub two_sided: bool,
     /// Whether camera and reflected rays pass through the back of a one-sided surface.
     pub cull: bool,
-    /// Picture that multiplies k_d.
+    /// Image that multiplies k_d.
     pub diffuse_map: Option<TextureMap>,
-    /// Picture that multiplies Emiss.
+    /// Image that multiplies Emiss.
     pub emission_map: Option<TextureMap>,
+    /// Where the surface is opaque; `None` for everywhere.
+    pub alpha_mask: Option<AlphaMask>,
+}
+
+impl Material {
+    /// A material that reflects light diffusely.
+    pub fn diffuse(color: Vec3) -> Self {
+        Self { diffuse: color, ..Self::default() }
+    }
 }
 
 impl Default for Material {
@@ -36,6 +45,7 @@ impl Default for Material {
             cull: false,
             diffuse_map: None,
             emission_map: None,
+            alpha_mask: None,
         }
     }
 }

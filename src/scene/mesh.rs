@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 
 /// Vertex positions in object space, shared with the acceleration structure without a copy.
 ///
 /// The buffer ends in one vertex of padding, since Embree reads four bytes past the last position.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Positions(Arc<Vec<[f32; 3]>>);
 
 impl Positions {
@@ -50,11 +50,8 @@ impl TriangleMaterials {
     }
 }
 
-/// Tells whether a triangle is opaque at barycentric `(triangle, u, v)`; used by camera and shadow rays alike.
-pub type CutOut = Arc<dyn Fn(u32, f32, f32) -> bool + Send + Sync>;
-
 /// Triangles that share vertices: what an acceleration structure is built over.
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     /// Name from the file, for messages.
     pub name: String,
@@ -70,21 +67,47 @@ pub struct TriangleMesh {
     pub colors: Option<Vec<[f32; 3]>>,
     /// Materials.
     pub materials: TriangleMaterials,
-    /// Where the triangles are cut out; `None` for solid geometry.
-    pub cutout: Option<CutOut>,
 }
 
 impl TriangleMesh {
+    /// A mesh of triangles given by indices into positions, with material 0 and nothing else.
+    pub fn new(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            name: String::new(),
+            positions: Positions::new(positions),
+            triangles: Arc::new(triangles),
+            normals: None,
+            uvs: None,
+            colors: None,
+            materials: TriangleMaterials::Uniform(0),
+        }
+    }
+
+    /// The mesh with one material for all triangles, an index into [`Scene::materials`](super::Scene::materials).
+    pub fn with_material(self, material: u32) -> Self {
+        Self { materials: TriangleMaterials::Uniform(material), ..self }
+    }
+
     /// The three corners of a triangle in object space.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         let positions = self.positions.as_slice();
         self.triangles[triangle as usize].map(|i| Vec3::from_array(positions[i as usize]))
     }
+
+    /// Texture coordinates of a triangle at barycentric (u, v); 0 where the mesh has none.
+    #[inline]
+    pub fn uv(&self, triangle: u32, u: f32, v: f32) -> Vec2 {
+        let (Some(uvs), Some(corners)) = (&self.uvs, self.triangles.get(triangle as usize)) else {
+            return Vec2::ZERO;
+        };
+        let [a, b, c] = corners.map(|i| uvs.get(i as usize).map_or(Vec2::ZERO, |&uv| Vec2::from_array(uv)));
+        a * (1.0 - u - v) + b * u + c * v
+    }
 }
 
 /// A placed mesh.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// Index into [`Scene::meshes`](super::Scene::meshes).
     pub mesh: u32,

@@ -1,36 +1,58 @@
 //! The scene: what is rendered. Immutable once loaded.
 
+mod alpha_mask;
 mod bounds;
 mod camera;
+mod camera_rays;
 pub mod generate;
 mod light;
 pub mod load;
 mod material;
 mod mesh;
 pub mod random;
+mod ray;
 mod surface;
 mod texture;
+mod validate;
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
+pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
 pub use bounds::Bounds;
-pub use camera::Camera;
+pub use camera::{Camera, CameraError};
+pub use camera_rays::CameraRays;
 pub use light::{Falloff, LightShape, PointLight};
 pub use material::Material;
-pub use mesh::{CutOut, Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
+pub use ray::{Hit, Ray};
 pub use surface::{Interaction, SurfacePoint};
 pub use texture::{Texture, TextureMap, Wrap};
+pub use validate::{BadValue, MeshDataError, SceneError};
 
 /// Everything that is rendered, in world space of any unit of length.
-#[derive(Clone, Default)]
+///
+/// ```
+/// use glam::{Affine3A, Vec3};
+/// use lightmesh::scene::{Material, PointLight, Scene, TriangleMesh};
+///
+/// let mut scene = Scene::new();
+/// let red = scene.add_material(Material::diffuse(Vec3::new(0.7, 0.1, 0.1)));
+/// let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = scene.add(TriangleMesh::new(positions, vec![[0, 1, 2]]).with_material(red));
+/// scene.place(mesh, Affine3A::from_translation(Vec3::X));
+/// scene.lights.push(PointLight::point(Vec3::Z, Vec3::ONE));
+/// scene.validate()?;
+/// # Ok::<(), lightmesh::scene::SceneError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// Unique geometry.
     pub meshes: Vec<Arc<TriangleMesh>>,
     /// Placements of the meshes; every mesh is placed at least once.
     pub instances: Vec<Instance>,
-    /// Materials; index 0 always exists.
+    /// Materials; at least one.
     pub materials: Vec<Material>,
     /// Point lights.
     pub lights: Vec<PointLight>,
@@ -38,4 +60,30 @@ pub struct Scene {
     pub falloff: Falloff,
     /// Radiance of rays that leave the scene, linear RGB.
     pub background: Vec3,
+}
+
+impl Scene {
+    /// A scene without geometry and lights, and with a default material at index 0.
+    pub fn new() -> Self {
+        Self { materials: vec![Material::default()], ..Self::default() }
+    }
+
+    /// Adds a material; its index.
+    pub fn add_material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        self.materials.len() as u32 - 1
+    }
+
+    /// Adds a mesh that is in world space already; its index.
+    pub fn add(&mut self, mesh: TriangleMesh) -> u32 {
+        let index = self.meshes.len() as u32;
+        self.meshes.push(Arc::new(mesh));
+        self.instances.push(Instance { mesh: index, to_world: None });
+        index
+    }
+
+    /// Places a mesh once more.
+    pub fn place(&mut self, mesh: u32, to_world: Affine3A) {
+        self.instances.push(Instance { mesh, to_world: Some(to_world) });
+    }
 }

@@ -2,8 +2,7 @@
 
 use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
-use super::{Scene, TextureMap};
-use crate::accel::Hit;
+use super::{Hit, Scene, TextureMap};
 
 /// A visible surface point y (spec §1).
 ///
@@ -171,7 +170,6 @@ mod tests {
                 uvs: None,
                 colors: None,
                 materials: TriangleMaterials::Uniform(0),
-                cutout: None,
             })],
             instances: vec![Instance { mesh: 0, to_world }],
             materials: vec![Material { emission: Vec3::ONE, ..Material::default() }],

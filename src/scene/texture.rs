@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine2, Vec2, Vec3};
 
+use crate::color::linear_from_srgb;
+
 /// Picture with colours and coverage, 8 bits each as in the file; colours are sRGB-encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
@@ -116,9 +118,8 @@ impl TextureMap {
 
 /// Linear light of an 8-bit sRGB value.
 fn linear(encoded: u8) -> f32 {
-    static TABLE: std::sync::LazyLock<[f32; 256]> = std::sync::LazyLock::new(|| {
-        std::array::from_fn(|code| crate::image::tone::linear_from_srgb(code as f32 / 255.0))
-    });
+    static TABLE: std::sync::LazyLock<[f32; 256]> =
+        std::sync::LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)));
     TABLE[usize::from(encoded)]
 }
 

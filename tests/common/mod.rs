@@ -1,9 +1,9 @@
 //! What the rendering tests share: small scenes made by hand, and renders with the best backend there is.
 
-#![allow(dead_code, reason = "every test file uses a part")]
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests state what they expect")]
+#![allow(dead_code, reason = "every test program uses a part")]
 
 pub mod soup;
+pub mod triangles;
 
 use std::sync::Arc;
 
@@ -68,7 +68,6 @@ impl Builder {
             uvs: None,
             colors: None,
             materials: TriangleMaterials::PerTriangle(self.materials),
-            cutout: None,
         };
         Scene {
             meshes: vec![Arc::new(mesh)],

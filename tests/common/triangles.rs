@@ -1,12 +1,13 @@
 //! Triangle meshes and scenes by hand, for tests of what rays hit.
 
-#![allow(dead_code, reason = "every test file uses a part")]
-
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine2, Affine3A, Vec2, Vec3};
 use lightmesh::scene::random::SplitMix64;
-use lightmesh::scene::{CutOut, Instance, Material, Positions, Scene, TriangleMaterials, TriangleMesh};
+use lightmesh::scene::{
+    AlphaMask, Instance, Material, Positions, Scene, Texture, TextureMap, TriangleMaterials, TriangleMesh,
+    Wrap,
+};
 
 /// Small, seeded, and the same everywhere.
 pub struct Random(SplitMix64);
@@ -30,30 +31,66 @@ impl Random {
     }
 }
 
-pub fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
+/// Material of [`scene`] with holes that differ from place to place.
+pub const HOLES: u32 = 1;
+/// Material of [`scene`] that is opaque where the texture coordinate u reaches 1/4.
+pub const RIM: u32 = 2;
+/// Material of [`scene`] that is opaque nowhere.
+pub const INVISIBLE: u32 = 3;
+
+/// A mesh of one material without an alpha mask, or of those given. The texture coordinates of vertices 3k, 3k + 1 and
+/// 3k + 2 are (0, 0), (1, 0) and (0, 1): those of triangles without shared vertices are their barycentric ones.
+pub fn mesh(
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    materials: Option<TriangleMaterials>,
+) -> Arc<TriangleMesh> {
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].into_iter().cycle().take(positions.len());
     Arc::new(TriangleMesh {
         name: "test".into(),
         positions: Positions::new(positions),
         triangles: Arc::new(triangles),
         normals: None,
-        uvs: None,
+        uvs: Some(uvs.collect()),
         colors: None,
-        materials: TriangleMaterials::Uniform(0),
-        cutout,
+        materials: materials.unwrap_or(TriangleMaterials::Uniform(0)),
     })
 }
 
 pub fn scene(meshes: Vec<Arc<TriangleMesh>>, instances: Vec<(u32, Option<Affine3A>)>) -> Scene {
     let instances = instances.into_iter().map(|(mesh, to_world)| Instance { mesh, to_world }).collect();
-    Scene { meshes, instances, materials: vec![Material::default()], ..Scene::default() }
+    let checker = (0..36).map(|i| (i + i / 6) % 2 == 0);
+    let masks = [
+        AlphaMask { map: Some(map(6, 6, checker, 0.0)), alpha: 1.0, cutoff: 0.5 },
+        AlphaMask { map: Some(map(2, 1, [false, true], 0.25)), alpha: 1.0, cutoff: 0.5 },
+        AlphaMask { map: None, alpha: 0.0, cutoff: 0.5 },
+    ];
+    let masked = masks.map(|mask| Material { alpha_mask: Some(mask), ..Material::default() });
+    let materials = [Material::default()].into_iter().chain(masked).collect();
+    Scene { meshes, instances, materials, ..Scene::default() }
+}
+
+/// A map whose texels cover all or nothing, shifted to the left.
+fn map(width: u32, height: u32, covered: impl IntoIterator<Item = bool>, shift: f32) -> TextureMap {
+    let texels = covered.into_iter().map(|covered| [255, 255, 255, if covered { 255 } else { 0 }]).collect();
+    TextureMap {
+        texture: Arc::new(Texture::new(width, height, texels).expect("as many texels as the sides say")),
+        transform: Affine2::from_translation(Vec2::new(shift, 0.0)),
+        wrap: [Wrap::Clamp; 2],
+    }
 }
 
 /// Triangles without shared vertices, with corners up to `size` around places in [−1, 1)³.
-pub fn soup(random: &mut Random, count: u32, size: f32, cutout: Option<CutOut>) -> Arc<TriangleMesh> {
+pub fn soup(
+    random: &mut Random,
+    count: u32,
+    size: f32,
+    materials: Option<TriangleMaterials>,
+) -> Arc<TriangleMesh> {
     let corners = (0..count).flat_map(|_| {
         let centre = random.vec();
         [0; 3].map(|_| (centre + size * random.vec()).to_array())
     });
     let positions = corners.collect();
-    mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), cutout)
+    mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), materials)
 }

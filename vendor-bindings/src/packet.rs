@@ -15,6 +15,23 @@ pub const MAX_COORDINATE: f32 = 1.844e18;
 /// that much, which must stay far below the rounding of the others.
 pub const MIN_DIRECTION: f32 = 1e-10;
 
+/// Whether a ray can hit anything: origin and direction lie within ±`largest` (so they aren't NaN), the direction is
+/// not shorter than [`MIN_DIRECTION`], and the interval is one: `tnear` ≤ `tfar` and 0 ≤ `tfar`.
+#[inline(always)]
+pub fn is_valid_ray(origin: [f32; 3], direction: [f32; 3], [tnear, tfar]: [f32; 2], largest: f32) -> bool {
+    // No branches, so that loops over lanes vectorise.
+    let ([ox, oy, oz], [dx, dy, dz]) = (origin, direction);
+    let within = (ox.abs() <= largest)
+        & (oy.abs() <= largest)
+        & (oz.abs() <= largest)
+        & (dx.abs() <= largest)
+        & (dy.abs() <= largest)
+        & (dz.abs() <= largest);
+    let long = (dx.abs() >= MIN_DIRECTION) | (dy.abs() >= MIN_DIRECTION) | (dz.abs() >= MIN_DIRECTION);
+    let interval = (tfar >= tnear) & (tfar >= 0.0);
+    within & long & interval
+}
+
 /// Packet of `N` rays as a structure of arrays, `N` being 4, 8 or 16 (`RTCRay4`, `RTCRay8`, `RTCRay16`).
 ///
 /// A ray is `org + t * dir` for `tnear <= t <= tfar`; `dir` need not be normalised, `t` is in units of
@@ -102,25 +119,15 @@ impl<const N: usize> RayPacket<N> {
         }
     }
 
-    /// Which lanes hold a ray that can hit something: −1 for those, 0 for the others.
-    ///
-    /// Origin and direction must lie within ±`largest` (so they aren't NaN), the direction must not be shorter
-    /// than [`MIN_DIRECTION`], and the interval must be one: `tnear` ≤ `tfar` and 0 ≤ `tfar`.
+    /// Which lanes hold a [valid ray](is_valid_ray): −1 for those, 0 for the others.
     #[inline(always)]
     pub fn valid_lanes(&self, largest: f32) -> [i32; N] {
         let mut valid = [0; N];
         for (lane, valid) in valid.iter_mut().enumerate() {
-            let within = (self.org_x[lane].abs() <= largest)
-                & (self.org_y[lane].abs() <= largest)
-                & (self.org_z[lane].abs() <= largest)
-                & (self.dir_x[lane].abs() <= largest)
-                & (self.dir_y[lane].abs() <= largest)
-                & (self.dir_z[lane].abs() <= largest);
-            let direction = (self.dir_x[lane].abs() >= MIN_DIRECTION)
-                | (self.dir_y[lane].abs() >= MIN_DIRECTION)
-                | (self.dir_z[lane].abs() >= MIN_DIRECTION);
-            let interval = (self.tfar[lane] >= self.tnear[lane]) & (self.tfar[lane] >= 0.0);
-            *valid = -i32::from(within & direction & interval);
+            let origin = [self.org_x[lane], self.org_y[lane], self.org_z[lane]];
+            let direction = [self.dir_x[lane], self.dir_y[lane], self.dir_z[lane]];
+            *valid =
+                -i32::from(is_valid_ray(origin, direction, [self.tnear[lane], self.tfar[lane]], largest));
         }
         valid
     }

@@ -1,14 +1,13 @@
 //! Ray queries against a committed scene. None of them can fail or allocate.
 //!
-//! Rays that are none hit nothing: a component of origin or direction that is NaN or larger than
-//! [`Scene::largest_coordinate`], a direction below [`MIN_DIRECTION`], or an empty interval. They are kept from Embree, whose Debian builds
-//! have assertions on and abort on them. So they do on `tnear` < 0, which counts as 0 here.
+//! Rays that are not [valid](is_valid_ray) with [`Scene::largest_coordinate`] hit nothing. They are kept from Embree,
+//! whose Debian builds have assertions on and abort on them. So they do on `tnear` < 0, which counts as 0 here.
 
 use std::ptr;
 
 use crate::bindings::{embree3 as v3, embree4 as v4};
 use crate::library::Api;
-use crate::packet::{INVALID_ID, MIN_DIRECTION, RayHitPacket, RayPacket};
+use crate::packet::{INVALID_ID, RayHitPacket, RayPacket, is_valid_ray};
 use crate::scene::Scene;
 
 /// A ray `origin + t * direction` for `tnear <= t <= tfar`; the direction need not be normalised.
@@ -25,13 +24,9 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// As [`RayPacket::valid_lanes`].
     #[inline(always)]
     fn is_valid(&self, largest: f32) -> bool {
-        let within = |v: &[f32; 3]| v.iter().all(|x| x.abs() <= largest);
-        let interval = self.tfar >= self.tnear && self.tfar >= 0.0;
-        let long = self.direction.iter().any(|d| d.abs() >= MIN_DIRECTION);
-        within(&self.origin) && within(&self.direction) && long && interval
+        is_valid_ray(self.origin, self.direction, [self.tnear, self.tfar], largest)
     }
 }
 
@@ -55,7 +50,7 @@ pub struct Hit {
 /// Direction components below this part of the largest one become 0, which turns a ray by less than rounding does.
 ///
 /// Embree's boxes take what is below 10⁻¹⁸ for 0, its packets' frusta don't, and lose hits over the difference. With
-/// [`MIN_DIRECTION`] none is left; nor in the space of an instance, whose map [has no tiny entries
+/// [`MIN_DIRECTION`](crate::packet::MIN_DIRECTION) none is left; nor in the space of an instance, whose map [has no tiny entries
 /// either](crate::geometry).
 const TINY: f32 = 1e-8;
 

@@ -1,6 +1,6 @@
 //! A tree of triangles, and single rays against its leaves.
 
-use crate::scene::CutOut;
+use crate::scene::MaskedMesh;
 
 use super::lanes::{Lanes, map3};
 use super::node::{TriangleBlock, WIDTH, WideTree};
@@ -14,8 +14,8 @@ pub struct Blas {
     pub tree: WideTree,
     pub blocks: Vec<TriangleBlock>,
     pub parts: Vec<Part>,
-    /// Whether any part has a cut-out.
-    pub has_cutouts: bool,
+    /// Whether any part has an alpha mask.
+    pub has_masks: bool,
 }
 
 /// The triangles of a tree that come from one mesh.
@@ -24,7 +24,8 @@ pub struct Part {
     pub first: u32,
     /// Index of the instance, for trees that are not instanced.
     pub instance: u32,
-    pub cutout: Option<CutOut>,
+    /// The mesh with its alpha masks, if it has any.
+    pub masked: Option<MaskedMesh>,
 }
 
 /// Nearest hit so far, within one tree.
@@ -73,13 +74,13 @@ impl Blas {
     /// Whether a hit lies where its triangle is opaque.
     #[inline(always)]
     pub fn is_opaque(&self, id: u32, hit: &LaneHit) -> bool {
-        !self.has_cutouts || self.asks_cutout(id, hit)
+        !self.has_masks || self.passes_mask(id, hit)
     }
 
     #[inline(never)]
-    fn asks_cutout(&self, id: u32, hit: &LaneHit) -> bool {
+    fn passes_mask(&self, id: u32, hit: &LaneHit) -> bool {
         match self.part(id) {
-            Some(Part { first, cutout: Some(opaque), .. }) => opaque(id - first, hit.u, hit.v),
+            Some(Part { first, masked: Some(masked), .. }) => masked.is_opaque(id - first, hit.u, hit.v),
             _ => true,
         }
     }
@@ -165,7 +166,7 @@ impl Blas {
             simd.splat(t_near),
             simd.splat(t_far),
         );
-        if distances.hits != 0 && !self.has_cutouts {
+        if distances.hits != 0 && !self.has_masks {
             return true;
         }
         let mut hits = distances.hits | distances.undecided;

@@ -146,7 +146,7 @@ impl Blas {
             else {
                 continue;
             };
-            if !self.has_cutouts {
+            if !self.has_masks {
                 blocked |= distances.hits;
             }
             let mut hits = (distances.hits | distances.undecided) & !blocked;
@@ -197,7 +197,7 @@ impl Blas {
                 continue;
             };
             let id = block.ids[triangle];
-            if distances.undecided == 0 && !self.has_cutouts {
+            if distances.undecided == 0 && !self.has_masks {
                 if distances.hits != 0 {
                     found.offer_all(&distances, id, rays);
                 }

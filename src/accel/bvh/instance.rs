@@ -2,9 +2,10 @@
 
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
-use crate::accel::{Ray, largest_coordinate_of};
+use crate::accel::largest_coordinate_of;
 
 use super::lanes::map3;
+use crate::scene::Ray;
 
 /// The map of rays from world to object space, row by row; t is the same on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]

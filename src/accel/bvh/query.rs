@@ -4,12 +4,13 @@ use pulp::NullaryFnOnce;
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
 
-use crate::accel::{Accel, Coherence, Hit, INVALID_ID, LaneMask, Ray, RayHitPacket, RayPacket};
+use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket};
 
 use super::lanes::{Lanes, Portable};
 use super::node::WIDTH;
 use super::packet::{PacketRays, RawRays};
 use super::{BvhAccel, SimdLevel};
+use crate::scene::{Hit, Ray};
 
 /// Proof that the processor has what the chosen level needs.
 #[derive(Clone, Copy)]

@@ -1,8 +1,7 @@
 //! Rays with what boxes and triangles need precomputed.
 
-use crate::accel::Ray;
-
 use super::lanes::map3;
+use crate::scene::Ray;
 
 /// A ray that is fit for traversal.
 #[derive(Clone, Copy, Debug)]

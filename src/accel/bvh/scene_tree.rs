@@ -1,12 +1,13 @@
 //! Both levels: a tree of all triangles in world space, trees per instanced mesh, and a tree of instances.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::accel::MAX_COORDINATE;
-use crate::scene::{Scene, TriangleMesh};
+use crate::scene::{AlphaMasks, Scene, TriangleMesh};
 
 use super::BvhError;
 use super::blas::{Blas, Part};
@@ -36,11 +37,11 @@ pub struct Placed {
 }
 
 /// Builds one tree over meshes in world space; `meshes` come with the index of their instance.
-pub fn build_blas(meshes: &[(u32, &TriangleMesh)]) -> Result<Blas, BvhError> {
+pub fn build_blas(meshes: &[(u32, &Arc<TriangleMesh>)], masks: &AlphaMasks) -> Result<Blas, BvhError> {
     let mut parts = Vec::with_capacity(meshes.len());
     let mut total = 0u32;
     for (instance, mesh) in meshes {
-        parts.push(Part { first: total, instance: *instance, cutout: mesh.cutout.clone() });
+        parts.push(Part { first: total, instance: *instance, masked: masks.of_mesh(mesh) });
         // Numbers share their word with the leaf bit and the "none" mark of references.
         total = u32::try_from(mesh.triangles.len())
             .ok()
@@ -48,7 +49,7 @@ pub fn build_blas(meshes: &[(u32, &TriangleMesh)]) -> Result<Blas, BvhError> {
             .filter(|&total| total < LEAF)
             .ok_or(BvhError::TooManyTriangles)?;
     }
-    let has_cutouts = parts.iter().any(|part| part.cutout.is_some());
+    let has_masks = parts.iter().any(|part| part.masked.is_some());
 
     let mut primitives = Vec::with_capacity(total as usize);
     for ((_, mesh), part) in meshes.iter().zip(&parts) {
@@ -87,7 +88,7 @@ pub fn build_blas(meshes: &[(u32, &TriangleMesh)]) -> Result<Blas, BvhError> {
             block
         })
         .collect();
-    Ok(Blas { tree: collapsed.tree, blocks, parts, has_cutouts })
+    Ok(Blas { tree: collapsed.tree, blocks, parts, has_masks })
 }
 
 fn corners_of(positions: &[[f32; 3]], corners: &[u32; 3]) -> Option<[[f32; 3]; 3]> {
@@ -100,7 +101,8 @@ pub fn build_scene(scene: &Scene) -> Result<(Blas, Instances), BvhError> {
     let mesh_of = |index: u32, instance: usize| {
         scene.meshes.get(index as usize).ok_or(BvhError::NoSuchMesh { instance, mesh: index })
     };
-    let mut fixed: Vec<(u32, &TriangleMesh)> = Vec::new();
+    let masks = AlphaMasks::of_scene(scene);
+    let mut fixed: Vec<(u32, &Arc<TriangleMesh>)> = Vec::new();
     let mut instances = Instances::default();
     let mut tree_of_mesh = HashMap::new();
     let mut boxes = Vec::new();
@@ -117,7 +119,7 @@ pub fn build_scene(scene: &Scene) -> Result<(Blas, Instances), BvhError> {
         let tree = match tree_of_mesh.get(&instance.mesh) {
             Some(&tree) => tree,
             None => {
-                instances.trees.push(build_blas(&[(0, mesh)])?);
+                instances.trees.push(build_blas(&[(0, mesh)], &masks)?);
                 let tree = instances.trees.len() - 1;
                 tree_of_mesh.insert(instance.mesh, tree);
                 tree
@@ -146,5 +148,5 @@ pub fn build_scene(scene: &Scene) -> Result<(Blas, Instances), BvhError> {
         })
         .collect();
     instances.tree = collapsed.tree;
-    Ok((build_blas(&fixed)?, instances))
+    Ok((build_blas(&fixed, &masks)?, instances))
 }

@@ -2,7 +2,7 @@
 
 use pulp::NullaryFnOnce;
 
-use crate::accel::{Hit, LaneMask, Ray};
+use crate::accel::{LaneMask, is_valid_ray};
 
 use super::BvhAccel;
 use super::blas::{Blas, Nearest};
@@ -13,6 +13,7 @@ use super::ray::SingleRay;
 use super::scene_tree::Placed;
 use super::traverse::{any_hit, nearest_hit};
 use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
+use crate::scene::{Hit, Ray};
 
 /// Entries of a traversal stack.
 pub const STACK: usize = 160;
@@ -91,7 +92,7 @@ impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketNeare
 impl BvhAccel {
     #[inline(always)]
     pub(super) fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
-        let single = SingleRay::new(ray).filter(|_| ray.is_valid(self.largest))?;
+        let single = SingleRay::new(ray).filter(|_| is_valid_ray(ray, self.largest))?;
         let nearest = self.fixed.intersect::<S, STACK>(simd, &single);
         let mut best = None;
         self.offer_fixed(&nearest, &mut best);
@@ -136,7 +137,9 @@ impl BvhAccel {
 
     #[inline(always)]
     pub(super) fn occluded_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> bool {
-        let Some(single) = SingleRay::new(ray).filter(|_| ray.is_valid(self.largest)) else { return false };
+        let Some(single) = SingleRay::new(ray).filter(|_| is_valid_ray(ray, self.largest)) else {
+            return false;
+        };
         if self.fixed.occluded::<S, STACK>(simd, &single) {
             return true;
         }

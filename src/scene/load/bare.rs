@@ -1,5 +1,5 @@
 //! A model without a scene file: its settings are chosen. What it lacks of camera and lights,
-//! [`complete_view`](crate::framing::complete_view) chooses.
+//! [`choose_view`](crate::framing::choose_view) chooses.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -30,28 +30,30 @@ pub fn open_scene(path: &Path) -> Result<OpenedScene, LoadError> {
         return Ok(OpenedScene { loaded, choices: Vec::new(), bare: false });
     }
     let model = load_model(path)?;
-    Ok(complete(model))
+    Ok(OpenedScene::of_model(model))
 }
 
-/// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
-pub fn complete(model: Model) -> OpenedScene {
-    let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
-    let scene = Scene {
-        meshes: meshes.into_iter().map(Arc::new).collect(),
-        instances,
-        materials,
-        lights,
-        falloff: Falloff::InverseSquare,
-        background: Vec3::ZERO,
-    };
-    let mut settings = Settings { lambertian: true, ..Settings::default() };
-    let spacing = spacing(scene.bounds(), &scene.lights);
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
-    settings.light_mesh.points.radius = Radius::Spacings(2.0);
-    settings.light_mesh.resolve = Resolve::Trace;
-    let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
-    let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
-    OpenedScene { loaded, choices, bare: true }
+impl OpenedScene {
+    /// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
+    pub fn of_model(model: Model) -> Self {
+        let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
+        let scene = Scene {
+            meshes: meshes.into_iter().map(Arc::new).collect(),
+            instances,
+            materials,
+            lights,
+            falloff: Falloff::InverseSquare,
+            background: Vec3::ZERO,
+        };
+        let mut settings = Settings { lambertian: true, ..Settings::default() };
+        let spacing = spacing(scene.bounds(), &scene.lights);
+        settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
+        settings.light_mesh.points.radius = Radius::Spacings(2.0);
+        settings.light_mesh.resolve = Resolve::Trace;
+        let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
+        let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
+        Self { loaded, choices, bare: true }
+    }
 }
 
 /// Parts of the scene's diagonal between mesh points: at most, without knowledge of the lights, and at least.
@@ -86,19 +88,4 @@ fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
     let spacing = nearest.get(nearest.len() / 2).map_or(middle, |median| (median * 0.25).clamp(least, most));
     // Two digits say what is meant.
     format!("{spacing:.1e}").parse().unwrap_or(spacing)
-}
-
-/// Exposure in stops at which a picture is neither dark nor washed out: nine tenths of what is lit stay below 60 % of
-/// white.
-pub fn auto_exposure(pixels: &[[f32; 3]]) -> f32 {
-    let luminance = |[r, g, b]: &[f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let lit = pixels.iter().map(luminance).filter(|l| l.is_finite() && *l > 0.0);
-    let mut lit: Vec<f32> = lit.collect();
-    if lit.is_empty() {
-        return 0.0;
-    }
-    let tenth = lit.len() * 9 / 10;
-    let (_, bright, _) = lit.select_nth_unstable_by(tenth, f32::total_cmp);
-    // Quarters of a stop, so that two renders of nearly the same picture get the same.
-    ((0.6 / *bright).log2() * 4.0).round().clamp(-160.0, 160.0) / 4.0
 }

@@ -7,8 +7,7 @@ use crate::scene::{Positions, TriangleMesh};
 /// A vertex without a triangle so far.
 const UNUSED: u32 = u32::MAX;
 
-/// Drops vertices that no triangle has a corner at: they would count in the scene's bounds. Call it before the mesh
-/// gets a cut-out, which keeps vertex numbers.
+/// Drops vertices that no triangle has a corner at: they would count in the scene's bounds.
 pub fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let count = mesh.positions.as_slice().len();
     let mut number = vec![UNUSED; count];

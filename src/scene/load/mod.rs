@@ -5,7 +5,6 @@
 
 mod bare;
 mod compact;
-mod cutout;
 mod error;
 pub mod gltf;
 pub mod mtl;
@@ -24,7 +23,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-pub use bare::{OpenedScene, auto_exposure, complete, open_scene};
+pub use bare::{OpenedScene, open_scene};
 pub use error::{LoadError, Skipped, Warning};
 pub use parts::{MaterialOverride, Selector};
 pub use points::load_points;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, DMat3, Mat3A, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{Camera, CutOut, LightShape, PointLight, Positions, TriangleMesh};
+use crate::scene::{Camera, LightShape, PointLight, Positions, TriangleMesh};
 
 /// Whether directions survive a linear map.
 pub fn is_invertible(linear: &Mat3A) -> bool {
@@ -28,11 +28,6 @@ pub fn move_mesh(mesh: &mut TriangleMesh, to_world: &Affine3A) {
     if linear.determinant() < 0.0 {
         let turned = mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
         mesh.triangles = Arc::new(turned);
-        // The cut-out knows the corners in the order before.
-        mesh.cutout = mesh
-            .cutout
-            .take()
-            .map(|opaque| -> CutOut { Arc::new(move |triangle, u, v| opaque(triangle, v, u)) });
     }
 }
 

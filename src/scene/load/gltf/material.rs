@@ -9,9 +9,8 @@ use gltf_json::texture::{Info, WrappingMode};
 use gltf_json::validation::Checked;
 
 use super::document::Document;
-use crate::scene::load::cutout::AlphaMask;
 use crate::scene::load::{LoadError, Warning, pictures};
-use crate::scene::{Material, Texture, TextureMap, Wrap};
+use crate::scene::{AlphaMask, Material, Texture, TextureMap, Wrap};
 
 /// Reflectance of non-metals at normal incidence, as glTF has it.
 const DIELECTRIC: f32 = 0.04;
@@ -24,8 +23,6 @@ const BLEND_CUTOFF: f32 = 0.5;
 pub struct Converted {
     /// The material.
     pub material: Material,
-    /// Where it is transparent.
-    pub mask: Option<AlphaMask>,
     /// Set of texture coordinates that it uses.
     pub uv_set: u32,
 }
@@ -102,7 +99,7 @@ impl<'a> Materials<'a> {
             true => None,
             false => self.map(source.emissive_texture.as_ref(), &place, &mut uv_set)?,
         };
-        let mask = self.mask(source, base[3], diffuse_map.as_ref(), &place)?;
+        let alpha_mask = self.alpha_mask(source, base[3], diffuse_map.as_ref(), &place)?;
         let mut diffuse = diffuse;
         if extensions.is_some_and(|extensions| extensions.unlit.is_some()) {
             // The surface looks the same in any light: it sends its colour out by itself.
@@ -111,12 +108,21 @@ impl<'a> Materials<'a> {
             (diffuse, specular) = (Vec3::ZERO, Vec3::ZERO);
         }
         let two_sided = source.double_sided;
-        let material =
-            Material { name, diffuse, specular, emission, two_sided, cull: false, diffuse_map, emission_map };
-        Ok(Converted { material, mask, uv_set: uv_set.unwrap_or(0) })
+        let material = Material {
+            name,
+            diffuse,
+            specular,
+            emission,
+            two_sided,
+            cull: false,
+            diffuse_map,
+            emission_map,
+            alpha_mask,
+        };
+        Ok(Converted { material, uv_set: uv_set.unwrap_or(0) })
     }
 
-    fn mask(
+    fn alpha_mask(
         &mut self,
         source: &gltf_json::Material,
         alpha: f32,

@@ -20,7 +20,6 @@ use self::material::{Converted, Materials};
 use self::nodes::{PlacedNode, single};
 use self::primitive::{Context, Joints, MeshBuilder};
 use super::compact::drop_unused_vertices;
-use super::cutout::cut_out;
 use super::transform::{is_invertible, move_mesh};
 use super::{LoadError, Model, Part, Warning, source};
 use crate::scene::{Instance, Material, TriangleMesh};
@@ -135,8 +134,6 @@ impl Placer<'_> {
                 self.model.instances.extend(instances);
             }
         }
-        let masks: Vec<_> = self.converted.iter().map(|converted| converted.mask.clone()).collect();
-        cut_out(&mut mesh, &masks);
         let triangles = 0..mesh.triangles.len() as u32;
         self.model.parts.push(Part { mesh: index, object: uses.name, group: mesh.name.clone(), triangles });
         self.model.meshes.push(mesh);

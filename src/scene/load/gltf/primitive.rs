@@ -258,7 +258,6 @@ impl MeshBuilder {
             uvs: filled(self.uvs, count, [0.0; 2]),
             colors: filled(self.colors, count, [1.0; 3]),
             materials,
-            cutout: None,
         })
     }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::chunk::NameKind;
 use super::materials::MaterialTable;
 use super::statements::{ABSENT, Statements};
-use crate::scene::load::cutout::cut_out;
+use crate::color::linear_from_srgb;
 use crate::scene::load::triangulate::{Triangulator, has_no_area};
 use crate::scene::load::{LoadError, Model, Part, Warning};
 use crate::scene::{Instance, Positions, TriangleMaterials, TriangleMesh};
@@ -51,9 +51,8 @@ pub fn assemble(
         return Err(LoadError::Empty { file: path.to_owned(), skipped });
     }
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut mesh = builder.finish(name);
-    let (materials, masks, more) = table.into_used();
-    cut_out(&mut mesh, &masks);
+    let mesh = builder.finish(name);
+    let (materials, more) = table.into_used();
     warnings.extend(more);
     let instances = vec![Instance { mesh: 0, to_world: None }];
     Ok(Model { meshes: vec![mesh], instances, materials, parts, skipped, warnings, ..Model::default() })
@@ -72,14 +71,11 @@ fn normalize(normals: &mut [[f32; 3]]) -> u64 {
         .sum()
 }
 
-/// Vertex colours are sRGB, as modelling programs write them; whether they run to 255 instead of 1.
+/// Decodes vertex colours from sRGB, as modelling programs write them; returns whether they run to 255 instead of 1.
 fn colors_to_linear(colors: &mut [[f32; 3]]) -> bool {
     let bytes = colors.par_iter().any(|color| color.iter().any(|&c| c > 1.0));
     let scale = if bytes { 1.0 / 255.0 } else { 1.0 };
-    let linear = |c: f32| {
-        let c = (c * scale).min(1.0);
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    };
+    let linear = |c: f32| linear_from_srgb((c * scale).min(1.0));
     colors.par_iter_mut().for_each(|color| *color = color.map(linear));
     bytes
 }
@@ -348,6 +344,6 @@ impl<'a> MeshBuilder<'a> {
         };
         let positions = Positions::new(positions);
         let triangles = Arc::new(self.triangles);
-        TriangleMesh { name, positions, triangles, normals, uvs, colors, materials, cutout: None }
+        TriangleMesh { name, positions, triangles, normals, uvs, colors, materials }
     }
 }

@@ -9,10 +9,9 @@ use std::sync::Arc;
 use glam::{Affine2, Vec2};
 
 use super::chunk::{NameKind, NameStatement};
-use crate::scene::load::cutout::AlphaMask;
 use crate::scene::load::mtl::{MtlMaps, parse_mtl};
 use crate::scene::load::{LoadError, Warning, pictures, source};
-use crate::scene::{Material, Texture, TextureMap, Wrap};
+use crate::scene::{AlphaMask, Material, Texture, TextureMap, Wrap};
 
 /// Words of an `mtllib` statement that are tried as one name with spaces.
 const LONGEST_NAME: usize = 16;
@@ -31,7 +30,6 @@ pub struct MaterialTable {
     known: HashMap<String, Known>,
     index: HashMap<String, u32>,
     used: Vec<Material>,
-    masks: Vec<Option<AlphaMask>>,
     pictures: HashMap<PathBuf, Option<Arc<Texture>>>,
     /// What was found and done.
     pub warnings: Vec<Warning>,
@@ -77,7 +75,7 @@ impl MaterialTable {
     }
 
     /// A material with its pictures, which are read only for materials in use.
-    fn complete(&mut self, known: Known) -> (Material, Option<AlphaMask>) {
+    fn complete(&mut self, known: Known) -> Material {
         let Known { mut material, maps, library } = known;
         let mut read = |name: &Option<String>| self.picture(name.as_deref()?, &library);
         let (diffuse, emission, coverage) = (read(&maps.diffuse), read(&maps.emission), read(&maps.coverage));
@@ -90,12 +88,12 @@ impl MaterialTable {
         material.emission_map = emission.map(map);
         let coverage = match (coverage, diffuse) {
             (Some(coverage), _) => Some(Arc::new(coverage.with_coverage(&coverage))),
-            // A picture's own transparency cuts out too, as programs show it.
+            // An image's own transparency counts too, as programs show it.
             (None, diffuse) => diffuse,
         };
         let mask = AlphaMask { map: coverage.map(map), alpha: maps.alpha.unwrap_or(1.0), cutoff: 0.5 };
-        let mask = (!mask.is_solid()).then_some(mask);
-        (material, mask)
+        material.alpha_mask = (!mask.is_solid()).then_some(mask);
+        material
     }
 
     /// A picture beside an MTL file; `None` with a warning where it can't be read.
@@ -128,7 +126,7 @@ impl MaterialTable {
             return index;
         }
         let index = self.used.len() as u32;
-        let (material, mask) = match self.known.get(name).cloned() {
+        let material = match self.known.get(name).cloned() {
             Some(known) => self.complete(known),
             None => {
                 if !name.is_empty() {
@@ -136,18 +134,17 @@ impl MaterialTable {
                     let line = Some(line as usize);
                     self.warnings.push(Warning { file: obj.to_owned(), line, message });
                 }
-                (Material { name: name.to_owned(), ..Material::default() }, None)
+                Material { name: name.to_owned(), ..Material::default() }
             }
         };
         self.used.push(material);
-        self.masks.push(mask);
         self.index.insert(name.to_owned(), index);
         index
     }
 
-    /// The materials that were asked for, in the order of their indices, where they are transparent, and the warnings.
-    pub fn into_used(self) -> (Vec<Material>, Vec<Option<AlphaMask>>, Vec<Warning>) {
-        (self.used, self.masks, self.warnings)
+    /// The materials in use, in the order of their indices, and the warnings.
+    pub fn into_used(self) -> (Vec<Material>, Vec<Warning>) {
+        (self.used, self.warnings)
     }
 }
 

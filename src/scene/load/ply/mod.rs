@@ -18,7 +18,7 @@ use self::vertices::Vertices;
 use super::compact::drop_unused_vertices;
 use super::triangulate::{Triangulator, has_no_area};
 use super::{LoadError, Model, Part, Skipped, Warning, source};
-use crate::image::tone::linear_from_srgb;
+use crate::color::linear_from_srgb;
 use crate::scene::{Instance, Material, Positions, TriangleMaterials, TriangleMesh};
 
 /// Corners that a face may have: far more than any real one, far fewer than triangulation can take.
@@ -214,7 +214,6 @@ fn assemble(vertices: Vertices, faces: &Faces, path: &Path) -> Result<Model, Loa
         uvs: given(uvs),
         colors: given(colors),
         materials: TriangleMaterials::Uniform(0),
-        cutout: None,
     };
     drop_unused_vertices(&mut mesh);
     let part =

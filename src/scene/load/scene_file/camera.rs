@@ -1,5 +1,6 @@
 //! `[camera]`.
 
+use glam::Vec3;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -26,19 +27,18 @@ impl CameraTable {
     /// # Errors
     /// If the view has no direction, or the same as up.
     pub fn camera(table: &Spanned<Self>, places: &Places) -> Result<Camera, LoadError> {
-        let error = |key: &str, problem| Err(places.error(&table.span(), key, problem));
         let CameraTable { name, position, look_at, up, vertical_fov } = table.get_ref();
-        let (position, look_at) = (position.0, look_at.0);
-        let up = up.map_or(glam::Vec3::Y, |up| up.0);
-        let view = (look_at.as_dvec3() - position.as_dvec3()).try_normalize();
-        let Some(view) = view else {
-            return error("camera.look_at", "must differ from position");
+        let camera = Camera {
+            name: name.clone(),
+            position: position.0,
+            look_at: look_at.0,
+            up: up.map_or(Vec3::Y, |up| up.0),
+            vertical_fov: vertical_fov.map_or(45.0, |fov| fov.0),
         };
-        // Below this sine, the picture's horizontal is made of rounding errors.
-        if view.cross(up.as_dvec3().normalize()).length() < 1e-6 {
-            return error("camera.up", "must not be parallel to the view direction");
-        }
-        let vertical_fov = vertical_fov.map_or(45.0, |fov| fov.0);
-        Ok(Camera { name: name.clone(), position, look_at, up, vertical_fov })
+        camera.validate().map_err(|error| {
+            let key = format!("camera.{}", error.field());
+            places.error(&table.span(), &key, error.problem())
+        })?;
+        Ok(camera)
     }
 }

@@ -8,7 +8,7 @@ use super::place::Places;
 use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point};
 use crate::scene::load::LoadError;
 use crate::scene::random::SplitMix64;
-use crate::scene::{Falloff, LightShape, PointLight};
+use crate::scene::{Falloff, PointLight};
 
 /// Lights that one table may lay out.
 const MAX_LIGHTS: u32 = 1_000_000;
@@ -81,26 +81,22 @@ impl LightTable {
     pub fn light(table: &Spanned<Self>, index: usize, places: &Places) -> Result<PointLight, LoadError> {
         let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
         let Self { position, direction, cone, intensity } = table.get_ref();
-        let direction = direction.map(|direction| direction.0.as_dvec3().normalize().as_vec3());
         if cone.is_some() && (position.is_none() || direction.is_none()) {
             return error("cone needs position and direction");
         }
         let [inner, outer] = cone.map_or([0.0, 45.0], |cone| cone.map(|angle| angle.0));
-        let shape = match direction {
+        let intensity = intensity.0;
+        match (position.map(|position| position.0), direction.map(|direction| direction.0)) {
             _ if !(0.0 <= inner && inner <= outer && outer <= 90.0) => {
-                return error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90");
+                error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90")
             }
-            None if position.is_none() => return error("needs a position or a direction"),
-            None => LightShape::Point,
-            Some(direction) if position.is_some() => LightShape::Spot {
-                direction,
-                inner_cosine: inner.to_radians().cos(),
-                outer_cosine: outer.to_radians().cos(),
-            },
-            Some(direction) => LightShape::Directional { direction },
-        };
-        let position = position.map_or(Vec3::ZERO, |position| position.0);
-        Ok(PointLight { position, intensity: intensity.0, shape })
+            (None, None) => error("needs a position or a direction"),
+            (Some(position), None) => Ok(PointLight::point(position, intensity)),
+            (Some(position), Some(direction)) => {
+                Ok(PointLight::spot(position, direction, [inner, outer], intensity))
+            }
+            (None, Some(direction)) => Ok(PointLight::directional(direction, intensity)),
+        }
     }
 }
 
@@ -144,7 +140,7 @@ impl LightBoxTable {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
-            PointLight::new(position, each * tint)
+            PointLight::point(position, each * tint)
         }))
     }
 }
@@ -170,7 +166,7 @@ impl LightGridTable {
         Ok((0..count).map(move |i| {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
-            PointLight::new(position, each)
+            PointLight::point(position, each)
         }))
     }
 }

@@ -5,12 +5,10 @@ use toml::Spanned;
 
 use super::place::Places;
 use super::values::{Count, Fraction, Stops};
+use crate::image::MAX_PIXELS;
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
 use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Radius, Resolve, Settings};
-
-/// Pixels that a picture may have.
-const MAX_PIXELS: u64 = 1 << 28;
 
 /// `[render]`
 #[derive(Default, Deserialize)]

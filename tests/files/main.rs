@@ -1,0 +1,15 @@
+//! What is read and written: models, scene files, pictures.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod damaged_images;
+mod formats;
+mod generate;
+mod image_io;
+mod malformed;
+mod obj;
+mod round_trips;
+mod scene_file;
+mod textures;
+mod whole_files;

@@ -1,0 +1,72 @@
+//! A picture depends on nothing but scene and settings: not on threads, blocks or timing, to the last bit.
+
+use glam::Vec3;
+use lightmesh::scene::load::LoadedScene;
+use lightmesh::settings::{
+    Estimator, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
+};
+
+use crate::common::{bits, forest, picture};
+
+fn scene() -> LoadedScene {
+    let mut loaded = forest(3_000, 20);
+    // Mirrors, so that there are paths of several points.
+    loaded.scene.materials.iter_mut().for_each(|material| material.specular = Vec3::splat(0.3));
+    loaded
+}
+
+/// The settings that take different ways through the renderer.
+fn variants() -> Vec<(&'static str, Settings)> {
+    // No multiple of the tile size, several blocks, several samples.
+    let base = Settings { resolution: (75, 67), samples_per_pixel: 2, ..Settings::default() };
+    let variant = |name, change: &dyn Fn(&mut Settings)| {
+        let mut settings = base.clone();
+        settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.5));
+        change(&mut settings);
+        (name, settings)
+    };
+    let indirect = || {
+        let mut indirect = IndirectSettings { directions: 16, ..IndirectSettings::default() };
+        indirect.points.spacing = Spacing::Units(Vec3::splat(2.0));
+        Some(indirect)
+    };
+    vec![
+        variant("conventional", &|s| s.integrator = Integrator::Conventional),
+        variant("per-light", &|_| {}),
+        variant("directional", &|s| s.light_mesh.estimator = Estimator::Directional),
+        variant("invalidated points", &|s| s.light_mesh.points.leaks = Leaks::Invalidate),
+        variant("blue noise", &|s| s.light_mesh.points.layout = PointLayout::BlueNoise { seed: 3 }),
+        variant("hybrid", &|s| s.light_mesh.resolve = Resolve::Trace),
+        variant("one bounce", &|s| s.light_mesh.indirect = indirect()),
+        variant("three bounces", &|s| {
+            s.light_mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, ..indirect });
+        }),
+    ]
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let loaded = scene();
+    for (name, settings) in variants() {
+        let pictures = [1, 2, 7].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| bits(&picture(&loaded.scene, &loaded.cameras[0], &settings).0))
+        });
+        assert!(pictures[0] == pictures[1] && pictures[0] == pictures[2], "{name}");
+        assert!(pictures[0].iter().any(|&bits| bits != 0), "{name}: all black");
+    }
+}
+
+#[test]
+fn the_block_size_changes_no_bit() {
+    let loaded = scene();
+    for (name, settings) in variants() {
+        let whole = bits(&picture(&loaded.scene, &loaded.cameras[0], &settings).0);
+        // One tile at a time, and a few tiles at a time.
+        for pixels in [1, 5_000] {
+            let settings = Settings { block_pixels: Some(pixels), ..settings.clone() };
+            let blocks = bits(&picture(&loaded.scene, &loaded.cameras[0], &settings).0);
+            assert!(blocks == whole, "{name}, blocks of {pixels} pixels");
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! A closed white furnace settles at e/(1 − ρ) everywhere (spec §5).
+
+use glam::Vec3;
+use lightmesh::scene::{Falloff, Material};
+use lightmesh::settings::{IndirectForm, IndirectSettings, Normalization, Settings, Spacing};
+
+use crate::common::{Builder, camera, picture};
+
+/// The pixels of a picture inside of a closed box whose walls all emit `emission` and reflect `albedo`.
+fn furnace(emission: f32, albedo: f32, indirect: IndirectSettings) -> Vec<[f32; 3]> {
+    let mut builder = Builder::default();
+    builder.cuboid(Vec3::new(-1.0, -1.0, -1.0), Vec3::new(1.0, 1.5, 1.2), true, 0);
+    let walls =
+        Material { diffuse: Vec3::splat(albedo), emission: Vec3::splat(emission), ..Material::default() };
+    let scene = builder.scene(vec![walls], Vec::new(), Falloff::default());
+    let mut settings = Settings { resolution: (24, 24), ..Settings::default() };
+    settings.light_mesh.indirect = Some(indirect);
+    let camera = camera(Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.2, -0.3, -1.0), 90.0);
+    picture(&scene, &camera, &settings).0.pixels
+}
+
+fn indirect(form: IndirectForm) -> IndirectSettings {
+    let mut indirect = IndirectSettings {
+        directions: 256,
+        bounces: 200,
+        tolerance: 1e-4,
+        form,
+        ..IndirectSettings::default()
+    };
+    indirect.points.spacing = Spacing::Units(Vec3::splat(0.6));
+    indirect
+}
+
+fn assert_all_within_one_percent(pixels: &[[f32; 3]], expected: f32, what: &str) {
+    for (index, pixel) in pixels.iter().enumerate() {
+        for value in pixel {
+            assert!(
+                (value - expected).abs() <= 0.01 * expected,
+                "{what}: pixel {index} is {value}, expected {expected}"
+            );
+        }
+    }
+}
+
+/// Radiance is the same in every direction and the geometric series of the bounces is its value.
+#[test]
+fn a_furnace_settles_at_the_sum_of_all_bounces() {
+    for albedo in [0.2, 0.5, 0.8] {
+        for form in [IndirectForm::Scalar, IndirectForm::Directional] {
+            let pixels = furnace(0.7, albedo, indirect(form));
+            assert_all_within_one_percent(
+                &pixels,
+                0.7 / (1.0 - albedo),
+                &format!("albedo {albedo}, {form:?}"),
+            );
+        }
+    }
+}
+
+/// One bounce is the paper's: what surfaces emit, and that reflected once.
+#[test]
+fn one_bounce_of_a_furnace_is_the_first_reflection_alone() {
+    for form in [IndirectForm::Scalar, IndirectForm::Directional] {
+        let pixels = furnace(0.7, 0.5, IndirectSettings { bounces: 1, ..indirect(form) });
+        assert_all_within_one_percent(&pixels, 0.7 * 1.5, &format!("{form:?}"));
+    }
+}
+
+/// Eq. (4) as printed integrates over the sphere, where the mean divides by its area: 4π times as much.
+#[test]
+fn the_integral_is_four_pi_times_the_mean() {
+    let settings = IndirectSettings {
+        bounces: 1,
+        normalization: Normalization::Integral,
+        ..indirect(IndirectForm::Scalar)
+    };
+    let expected = 0.7 * (1.0 + 0.5 * 4.0 * std::f32::consts::PI);
+    assert_all_within_one_percent(&furnace(0.7, 0.5, settings), expected, "integral");
+}

@@ -1,0 +1,76 @@
+//! Hybrid shadows are the conventional tracer's for a fraction of its rays (spec §4).
+
+use glam::Vec3;
+use lightmesh::render::Film;
+use lightmesh::scene::Falloff;
+use lightmesh::scene::generate::interior::Interior;
+use lightmesh::scene::load::{LoadedScene, load_scene_file};
+use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Settings, Spacing};
+
+use crate::common::{camera, conventional, forest, grey, light, picture};
+
+fn interior() -> LoadedScene {
+    let folder = tempfile::tempdir().unwrap();
+    Interior { bays: 6, lamps: 40 }.write(folder.path()).unwrap();
+    load_scene_file(&folder.path().join("interior.toml")).unwrap()
+}
+
+/// At 1200×1200 at most 1 % of the pixels differ from the conventional ones by more than 2 % of the image's mean, and at
+/// most the given share of the conventional shadow rays is traced, those of the mesh points included.
+fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32, share: f64) {
+    let mut settings = Settings { resolution: (1200, 1200), ..loaded.settings.clone() };
+    settings.light_mesh.indirect = None;
+    settings.light_mesh.resolve = Resolve::Trace;
+    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
+    settings.light_mesh.points.radius = Radius::Spacings(radius_in_spacings);
+    let (reference, conventional) = conventional(&loaded.scene, &loaded.cameras[0], &settings);
+    let (traced, hybrid) = picture(&loaded.scene, &loaded.cameras[0], &settings);
+    let mean = reference.pixels.as_flattened().iter().sum::<f32>() / (3 * reference.pixels.len()) as f32;
+    let differ = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 0.02 * mean);
+    let differing = traced.pixels.iter().zip(&reference.pixels).filter(|&pair| differ(pair)).count();
+    let rays = hybrid.rays.shadow as f64 / conventional.rays.shadow as f64;
+    println!("{differing} pixels differ, {rays:.3} of the shadow rays");
+    assert!(differing * 100 <= reference.pixels.len(), "{differing} pixels differ");
+    assert!(rays <= share, "{rays} of the conventional shadow rays");
+}
+
+/// Leaves of all sizes shade each other: few pairs of places and lights are wholly lit or wholly dark.
+#[test]
+fn in_the_forest_a_quarter_of_the_shadow_rays_is_saved() {
+    assert_saves_rays(&forest(23_542, 100), 0.2, 1.6, 0.75);
+}
+
+/// Walls, pillars and beams hide whole groups of lights from whole areas.
+#[test]
+fn in_the_interior_four_fifths_of_the_shadow_rays_are_saved() {
+    assert_saves_rays(&interior(), 0.1, 1.2, 0.2);
+}
+
+/// An occluder much thinner than the spacing, which no mesh point is behind, still casts its shadow: a few rays look for
+/// what the mesh points missed, and what they find spreads along the shadow.
+#[test]
+fn occluders_thinner_than_the_spacing_keep_their_shadows() {
+    let mut builder = crate::common::Builder::default();
+    builder.quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0, 0);
+    // A wire above the floor, 0.06 wide where mesh points are 0.5 apart; its shadow lies before it.
+    builder.quad(Vec3::new(-2.0, 0.15, -0.03), Vec3::Z * 0.06, Vec3::X * 4.0, 0);
+    let lights = vec![light(Vec3::new(0.3, 3.0, -2.0), Vec3::ONE)];
+    let scene = builder.scene(vec![grey(0.8)], lights, Falloff::default());
+    let camera = camera(Vec3::new(0.0, 3.0, 3.0), Vec3::ZERO, 45.0);
+    let mut settings = Settings { resolution: (320, 320), ..Settings::default() };
+    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.5));
+    settings.light_mesh.points.neighbourhood = Neighbourhood::Sphere;
+    settings.light_mesh.points.leaks = Leaks::Allow;
+    settings.light_mesh.resolve = Resolve::Trace;
+    let (reference, conventional) = conventional(&scene, &camera, &settings);
+    let (traced, hybrid) = picture(&scene, &camera, &settings);
+    let dark = |film: &Film| film.pixels.iter().filter(|p| p[0] == 0.0).count();
+    let (sky_and_shadow, found) = (dark(&reference), dark(&traced));
+    let mut lit = settings.clone();
+    lit.light_mesh.resolve = Resolve::Average;
+    let sky = dark(&picture(&scene, &camera, &lit).0);
+    let (shadow, missed) = (sky_and_shadow - sky, sky_and_shadow - found);
+    assert!(shadow > 500, "{shadow} pixels of shadow to find");
+    assert!(missed * 20 < shadow, "{missed} of {shadow} pixels of shadow are missed");
+    assert!(hybrid.rays.shadow * 2 < conventional.rays.shadow, "{} rays", hybrid.rays.shadow);
+}

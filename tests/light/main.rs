@@ -1,0 +1,17 @@
+//! What light comes to: formulas, limits, references, and the economy of rays.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod convergence;
+mod determinism;
+mod estimators;
+mod furnace;
+mod hybrid;
+mod lazy;
+mod leaks;
+mod penumbra;
+mod physical;
+mod real_scenes;
+mod reference;
+mod rows;

@@ -1,0 +1,134 @@
+//! The integrator `reference` gives the mean of eq. (3) that is known analytically, and light meshes converge to it.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use lightmesh::accel::{Backend, BackendChoice};
+use lightmesh::render::{Film, render};
+use lightmesh::scene::{
+    Camera, Falloff, Instance, Material, PointLight, Positions, Scene, TriangleMaterials, TriangleMesh,
+};
+use lightmesh::settings::{
+    Integrator, Leaks, LightMeshSettings, Neighbourhood, PointSettings, Radius, Settings, Spacing,
+};
+
+const LIGHT: Vec3 = Vec3::new(0.0, 10.0, 0.0);
+const EYE: Vec3 = Vec3::new(0.0, 4.0, 0.0);
+const FIELD_OF_VIEW: f32 = 40.0;
+const SIDE: u32 = 24;
+const RADIUS: f32 = 1.0;
+
+/// A rectangle at height `y`, facing up.
+fn rectangle(y: f32, x: (f32, f32), z: (f32, f32)) -> Arc<TriangleMesh> {
+    Arc::new(TriangleMesh {
+        name: String::new(),
+        positions: Positions::new(vec![[x.0, y, z.0], [x.0, y, z.1], [x.1, y, z.1], [x.1, y, z.0]]),
+        triangles: Arc::new(vec![[0, 1, 2], [0, 2, 3]]),
+        normals: None,
+        uvs: None,
+        colors: None,
+        materials: TriangleMaterials::Uniform(0),
+    })
+}
+
+/// White ground in the shadow of a half-plane at height 5 that ends at x = 0, under one light straight above the edge.
+fn half_plane() -> Scene {
+    Scene {
+        meshes: vec![
+            rectangle(0.0, (-30.0, 30.0), (-30.0, 30.0)),
+            rectangle(5.0, (-40.0, 0.0), (-40.0, 40.0)),
+        ],
+        instances: vec![Instance { mesh: 0, to_world: None }, Instance { mesh: 1, to_world: None }],
+        materials: vec![Material { diffuse: Vec3::ONE, ..Material::default() }],
+        lights: vec![PointLight::point(LIGHT, Vec3::ONE)],
+        falloff: Falloff::None,
+        background: Vec3::ZERO,
+    }
+}
+
+/// Looks straight down from below the half-plane.
+fn camera() -> Camera {
+    Camera {
+        name: String::new(),
+        position: EYE,
+        look_at: Vec3::ZERO,
+        up: Vec3::Z,
+        vertical_fov: FIELD_OF_VIEW,
+    }
+}
+
+fn settings(integrator: Integrator, neighbourhood: Neighbourhood, spacing: f32) -> Settings {
+    Settings {
+        resolution: (SIDE, SIDE),
+        integrator,
+        reference_samples: 1024,
+        light_mesh: LightMeshSettings {
+            points: PointSettings {
+                spacing: Spacing::Units(Vec3::splat(spacing)),
+                radius: Radius::Units(RADIUS),
+                neighbourhood,
+                leaks: Leaks::Allow,
+                ..PointSettings::default()
+            },
+            ..LightMeshSettings::default()
+        },
+        ..Settings::default()
+    }
+}
+
+fn picture(settings: &Settings) -> Film {
+    let scene = half_plane();
+    let backend = Backend::build(BackendChoice::BruteForce, &scene).expect("a small scene").backend;
+    render(&backend, &scene, &camera(), settings, &()).expect("a modest mesh").0
+}
+
+/// Ground point of a pixel's centre: the view's right is −x, its down −z.
+fn ground(column: usize, row: usize) -> Vec3 {
+    let pixel = 2.0 * EYE.y * (FIELD_OF_VIEW / 2.0).to_radians().tan() / SIDE as f32;
+    let middle = SIDE as f32 / 2.0;
+    Vec3::new(middle - (column as f32 + 0.5), 0.0, middle - (row as f32 + 0.5)) * pixel
+}
+
+/// The shadow's plane is vertical, so that the visible share of the half ball over a ground point at distance s of the
+/// edge is that of the whole ball: (2 + 3t − t³)/4 with t = s/R (spec §13), whatever the height of the occluder.
+#[test]
+fn the_penumbra_of_an_edge_has_its_analytic_profile() {
+    let film = picture(&settings(Integrator::Reference, Neighbourhood::Sphere, 0.5));
+    let mut penumbra = 0;
+    for (index, pixel) in film.pixels.iter().enumerate() {
+        let y = ground(index % SIDE as usize, index / SIDE as usize);
+        let t = (y.x / RADIUS).clamp(-1.0, 1.0);
+        penumbra += u32::from(t.abs() < 1.0);
+        let visible = (2.0 + 3.0 * t - t.powi(3)) / 4.0;
+        let cosine = LIGHT.y / (LIGHT - y).length();
+        assert!(
+            (pixel[0] - visible * cosine).abs() < 0.03,
+            "{} at {y} instead of {}",
+            pixel[0],
+            visible * cosine
+        );
+    }
+    assert!(penumbra > SIDE * SIDE / 2, "most of the picture is penumbra");
+}
+
+/// With R fixed, the light mesh's own error falls with every finer spacing, at the least by half over two
+/// halvings: more points make a better mean.
+#[test]
+fn light_meshes_converge_to_the_reference() {
+    let reference = picture(&settings(Integrator::Reference, Neighbourhood::SmoothSphere, 0.5));
+    let errors = [0.6, 0.3, 0.15].map(|spacing| {
+        let film = picture(&settings(Integrator::LightMesh, Neighbourhood::SmoothSphere, spacing));
+        let squares = film.pixels.iter().zip(&reference.pixels).map(|(a, b)| (a[0] - b[0]).powi(2));
+        (squares.sum::<f32>() / film.pixels.len() as f32).sqrt()
+    });
+    assert!(errors[0] > errors[1] && errors[1] > errors[2], "{errors:?}");
+    assert!(errors[2] < 0.5 * errors[0], "{errors:?}");
+}
+
+/// At infinite density the nearest mesh point is the surface point itself: hard shadows.
+#[test]
+fn the_nearest_point_of_an_infinite_mesh_is_the_surface_point() {
+    let reference = picture(&settings(Integrator::Reference, Neighbourhood::Nearest, 0.5));
+    let conventional = picture(&settings(Integrator::Conventional, Neighbourhood::Nearest, 0.5));
+    assert_eq!(reference, conventional);
+}

@@ -1,0 +1,59 @@
+//! The short cut for surface points in a row of the same normal gives what the plain way of shading gives.
+
+use glam::Vec3;
+use lightmesh::accel::BvhAccel;
+use lightmesh::light_mesh::{DirectMesh, PointMask, Scratch};
+use lightmesh::scene::SurfacePoint;
+use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, Neighbourhood, Spacing};
+
+use crate::common::{forest, surface_point};
+
+/// Rows of surface points: on the ground, and across the crowns at any slope.
+fn rows() -> Vec<SurfacePoint> {
+    let row = |start: Vec3, step: Vec3, normal: Vec3| {
+        (0..200).map(move |i| surface_point(start + step * i as f32, normal.normalize()))
+    };
+    row(Vec3::new(-8.0, 0.0, 2.0), Vec3::new(0.08, 0.0, 0.01), Vec3::Y)
+        .chain(row(Vec3::new(-7.0, 3.0, -3.0), Vec3::new(0.07, 0.01, 0.03), Vec3::new(1.0, 2.0, -0.5)))
+        .chain(row(Vec3::new(0.0, 2.0, -6.0), Vec3::new(0.0, 0.01, 0.06), Vec3::NEG_X))
+        .collect()
+}
+
+/// Both sum the same products, in another order: they agree to within rounding, whatever is done against leaks, and for
+/// estimators that have no short cut they are the same.
+#[test]
+fn surface_points_in_a_row_are_shaded_as_if_alone() {
+    let loaded = forest(5_000, 40);
+    let accel = BvhAccel::build(&loaded.scene).unwrap();
+    let surfaces = rows();
+    for estimator in [Estimator::Directional, Estimator::PerLight] {
+        for leaks in [Leaks::Allow, Leaks::Invalidate, Leaks::Visibility] {
+            for neighbourhood in [Neighbourhood::SmoothSphere, Neighbourhood::Sphere, Neighbourhood::Nearest]
+            {
+                let mut settings = LightMeshSettings { estimator, ..LightMeshSettings::default() };
+                settings.points.spacing = Spacing::Units(Vec3::splat(0.4));
+                settings.points.leaks = leaks;
+                settings.points.neighbourhood = neighbourhood;
+                let mut mesh = DirectMesh::new(&loaded.scene, &settings).unwrap();
+                let needed = PointMask::union(mesh.points.needed(surfaces.iter()));
+                mesh.evaluate(&accel, &loaded.scene, &needed);
+                let (mut alone, mut tile) = (Scratch::default(), Scratch::for_tile());
+                let mut lit = 0;
+                for surface in &surfaces {
+                    let expected = mesh.illumination(&accel, surface, &mut alone);
+                    let found = mesh.illumination_in_row(&accel, surface, &mut tile);
+                    // Light from all sides cancels where a normal turns away from it: what rounding is measured by.
+                    let scale = expected.max_element().max(0.1);
+                    assert!(
+                        found.abs_diff_eq(expected, 1e-5 * scale),
+                        "{found} for {expected}: {estimator:?}, {leaks:?}, {neighbourhood:?}, {}",
+                        surface.position
+                    );
+                    lit += usize::from(expected.max_element() > 0.01);
+                }
+                assert!(lit > surfaces.len() / 3, "only {lit} surface points have any light to compare");
+                assert_eq!(tile.fallbacks, alone.fallbacks);
+            }
+        }
+    }
+}

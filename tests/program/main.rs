@@ -1,0 +1,11 @@
+//! The program as a whole, mostly run as its users run it.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod awkward;
+mod bench;
+mod compare;
+mod gallery;
+mod memory;
+mod views;
