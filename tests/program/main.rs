@@ -8,4 +8,5 @@ mod bench;
 mod compare;
 mod gallery;
 mod memory;
+mod same_bytes;
 mod views;
