@@ -5,6 +5,7 @@ mod common;
 
 mod awkward;
 mod bench;
+mod command_line;
 mod compare;
 mod gallery;
 mod memory;
