@@ -37,7 +37,7 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
         let bundles = bundles(&setup, if options.quick { 1 << 10 } else { 1 << 20 });
         let mut contestants = Vec::new();
         for choice in [BackendChoice::Embree, BackendChoice::Bvh] {
-            log(&format!("{choice:?}, {triangles} triangles"));
+            log(&format!("{choice}, {triangles} triangles"));
             contestants.extend(Contestant::build(&setup, choice, options, &mut report, log)?);
         }
         measure(contestants, &bundles, options, &mut report)?;

@@ -9,7 +9,7 @@ use crate::settings::{
     Settings, ShadingSettings, Spacing,
 };
 
-/// A choice of light-mesh settings. R is fixed in scene units, so that all spacings approximate the same picture.
+/// A choice of light-mesh settings. R is fixed in scene units, so that all spacings approximate the same image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration {
     /// Estimator.

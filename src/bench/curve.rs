@@ -24,10 +24,10 @@ pub struct Tried {
 
 /// What the curve is measured on.
 struct Sizes {
-    /// Side of the pictures that are timed, pixels.
+    /// Side of the images that are timed, pixels.
     time_side: u32,
     /// Side of the references. The timed side is an odd multiple of it, so that their pixels' centres are pixels' centres
-    /// of the timed picture: errors need no frame of their own.
+    /// of the timed image: errors need no frame of their own.
     error_side: u32,
     reference_samples: u32,
     /// R, and spacings in the same proportions to it: the error hangs on their ratio.
@@ -73,7 +73,7 @@ pub fn measure(
         let softness = relative_rmse(&exact, &setup.frame(backend, &hard)?.image);
         let mut table = Table::new(
             format!(
-                "Error over time at R = {radius}, {0}×{0} pixels; the picture it approximates differs from hard \
+                "Error over time at R = {radius}, {0}×{0} pixels; the image it approximates differs from hard \
                  shadows by {1:.1} %",
                 sizes.time_side,
                 100.0 * softness
@@ -115,7 +115,7 @@ pub fn measure(
     Ok(all)
 }
 
-/// The picture that light meshes of a configuration approximate, `side` pixels wide and high.
+/// The image that light meshes of a configuration approximate, `side` pixels wide and high.
 pub fn reference_image(
     setup: &Setup,
     backend: &Backend,
@@ -156,7 +156,7 @@ fn every(image: &Image, step: u32) -> Result<Image, BenchError> {
 }
 
 /// The fastest configuration whose errors, own and exact, are both within `limit`; if there is none, the one with the
-/// smallest errors. Estimators that don't converge to the conventional picture are left out.
+/// smallest errors. Estimators that don't converge to the conventional image are left out.
 pub fn fastest_within(tried: &[Tried], limit: f64) -> Option<&Tried> {
     let worst = |tried: &Tried| tried.own_error.max(tried.exact_error);
     let converging = |tried: &&Tried| {
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(values, [10.0, 13.0, 16.0, 37.0, 40.0, 43.0]);
     }
 
-    /// The fastest is taken only among those that are good enough by both measures and converge to the right picture.
+    /// The fastest is taken only among those that are good enough by both measures and converge to the right image.
     #[test]
     fn speed_never_buys_error() {
         let all = [

@@ -12,7 +12,7 @@ use crate::settings::Settings;
 /// Side in pixels, lights, goals for the two meshes, goal in units of the camera rays.
 type CaseGoals = (u32, u32, [Option<f64>; 2], Option<f64>);
 
-/// Pictures that are compared: side in pixels, lights, goals for the two meshes (times faster), and the goal for the
+/// Images that are compared: side in pixels, lights, goals for the two meshes (times faster), and the goal for the
 /// light-mesh frame in units of the camera rays alone.
 const CASES: [CaseGoals; 3] = [
     (600, 100, [Some(10.0), Some(4.0)], Some(4.0)),
@@ -62,7 +62,7 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
     Ok(report)
 }
 
-/// One size of picture and number of lights.
+/// One size of image and number of lights.
 struct Case<'a> {
     setup: &'a Setup,
     backend: &'a Backend,

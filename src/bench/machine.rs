@@ -11,7 +11,7 @@ pub struct Machine {
     pub processor: String,
     /// Threads that run at the same time.
     pub logical_processors: usize,
-    /// Mean number of runnable threads over the last minute, before the benchmark; `None` where the system doesn't tell.
+    /// Mean number of runnable threads over the last minute, before the benchmark; `None` where the system doesn't report it.
     pub load_average: Option<f64>,
     /// Operating system and architecture.
     pub platform: String,

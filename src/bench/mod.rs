@@ -40,7 +40,7 @@ named_enum! {
         Headline = "headline",
         /// Time over resolution, lights, triangles, spacing and threads
         Scaling = "scaling",
-        /// Rays per second of the backends, by kind of ray and packet width
+        /// Rays per second of all backends, by kind of ray and packet width
         Backends = "backends",
         /// Evaluation of mesh points against a loop that only traces the same rays
         Rays = "rays",
@@ -72,6 +72,9 @@ impl BenchOptions {
 /// Why a benchmark can't be run.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
+    /// There is no place for temporary files.
+    #[error("cannot create a temporary folder")]
+    Folder(#[source] std::io::Error),
     /// The scene can't be written.
     #[error(transparent)]
     Generate(#[from] GenerateError),
@@ -90,11 +93,11 @@ pub enum BenchError {
     /// A frame can't be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A picture can't be held.
+    /// An image can't be held.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// Threads can't be started.
-    #[error("cannot start the threads: {0}")]
+    #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A process can't be measured.
     #[error("{}: {reason}", program.display())]
@@ -106,7 +109,7 @@ pub enum BenchError {
     },
 }
 
-/// Runs a benchmark; `log` hears what is being done.
+/// Runs a benchmark; `log` receives what is being done.
 ///
 /// # Errors
 /// See [`BenchError`].

@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 
 use super::configuration::{Configuration, conventional};
 use super::report::{Aim, Goal, Plot, Report, Series, Table};
-use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, TemporaryFolder, forest, new_report};
+use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, forest, new_report, temporary_folder};
 use super::timing::timed;
 use super::{BenchError, BenchOptions, shading, threads};
 use crate::accel::Backend;
@@ -204,15 +204,15 @@ fn whole_process(
     let (triangles, (width, height)) = sizes.process;
     log(&format!("{triangles} triangles in a process of its own"));
     let failed = |reason: String| BenchError::Process { program: program.clone(), reason };
-    let folder = TemporaryFolder::new();
-    Forest { triangles, lights: PAPER_LIGHTS, seed: 1 }.write(&folder.0)?;
-    let stats_path = folder.0.join("stats.json");
+    let folder = temporary_folder()?;
+    Forest { triangles, lights: PAPER_LIGHTS, seed: 1 }.write(folder.path())?;
+    let stats_path = folder.path().join("stats.json");
     let output = Command::new(program)
         .arg("render")
-        .arg(folder.0.join("forest.toml"))
+        .arg(folder.path().join("forest.toml"))
         .arg("--quiet")
         .arg("--output")
-        .arg(folder.0.join("forest.exr"))
+        .arg(folder.path().join("forest.exr"))
         .arg("--stats")
         .arg(&stats_path)
         .args(["--resolution", &format!("{width}x{height}")])
@@ -237,14 +237,14 @@ fn whole_process(
         report.record(format!("process {triangles}: {stage}"), vec![second(stage)]);
         table.rows.push(vec![stage.to_owned(), format!("{:.3}", second(stage))]);
     }
-    // The picture in memory: three floats per pixel.
-    let picture = f64::from(width) * f64::from(height) * 12.0;
+    // The image in memory: three floats per pixel.
+    let image = f64::from(width) * f64::from(height) * 12.0;
     let peak = stats["peak_rss_bytes"].as_f64().unwrap_or(f64::NAN);
-    let per_triangle = (peak - picture) / f64::from(triangles);
+    let per_triangle = (peak - image) / f64::from(triangles);
     table.rows.push(vec!["peak memory, bytes".to_owned(), format!("{peak:.0}")]);
     report.tables.push(table);
     report.goals.push(Goal::new(
-        format!("peak bytes per triangle beyond the picture, {triangles} triangles"),
+        format!("peak bytes per triangle beyond the image, {triangles} triangles"),
         per_triangle,
         Aim::AtMost,
         250.0,

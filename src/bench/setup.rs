@@ -1,10 +1,7 @@
 //! The scene that is measured, and single frames of it.
 
-use std::fs;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::Vec3;
+use tempfile::TempDir;
 
 use super::machine::Machine;
 use super::report::Report;
@@ -46,33 +43,18 @@ pub struct Frame {
     pub seconds: f64,
 }
 
-/// A folder that is removed when it goes out of use.
-pub struct TemporaryFolder(pub PathBuf);
-
-impl TemporaryFolder {
-    /// A folder of a name that nobody else uses; it is created by whoever writes into it.
-    pub fn new() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let name = format!("lightmesh-bench-{}-{number}", std::process::id());
-        Self(std::env::temp_dir().join(name))
-    }
-}
-
-impl Drop for TemporaryFolder {
-    fn drop(&mut self) {
-        // What can't be removed stays in the system's folder for temporary files.
-        let _ = fs::remove_dir_all(&self.0);
-    }
+/// A new folder that is removed when it goes out of use.
+pub fn temporary_folder() -> Result<TempDir, BenchError> {
+    tempfile::Builder::new().prefix("lightmesh-bench-").tempdir().map_err(BenchError::Folder)
 }
 
 /// The forest of `lightmesh generate forest`, written and read like any scene.
 ///
 /// The sky is black: it would add to the image's mean, by which errors are divided, but never to the errors.
 pub fn forest(triangles: u32, lights: u32) -> Result<Setup, BenchError> {
-    let folder = TemporaryFolder::new();
-    Forest { triangles, lights, seed: 1 }.write(&folder.0)?;
-    let (load_seconds, loaded) = timed(|| load_scene_file(&folder.0.join("forest.toml")));
+    let folder = temporary_folder()?;
+    Forest { triangles, lights, seed: 1 }.write(folder.path())?;
+    let (load_seconds, loaded) = timed(|| load_scene_file(&folder.path().join("forest.toml")));
     let loaded = loaded?;
     let mut scene = loaded.scene;
     scene.background = Vec3::ZERO;

@@ -56,7 +56,7 @@ pub struct CompareArgs {
 
 /// A number whose exceeding fails the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limit {
+struct Limit {
     metric: Metric,
     limit: f64,
 }
@@ -195,17 +195,18 @@ impl Limit {
 /// What is printed, by name.
 fn fields(image: &Image, metrics: &Metrics) -> Vec<(&'static str, Value)> {
     let max = metrics.max;
+    let number = |metric: Metric| (metric.name(), json!(metric.of(metrics)));
     vec![
-        ("rmse", json!(metrics.rmse)),
-        ("relative_rmse", json!(metrics.relative_rmse)),
-        ("mean_relative_error", json!(metrics.mean_relative_error)),
-        ("block_mean_relative_error", json!(metrics.block_mean_relative_error)),
+        number(Metric::Rmse),
+        number(Metric::RelativeRmse),
+        number(Metric::MeanRelativeError),
+        number(Metric::BlockMeanRelativeError),
         ("psnr", json!(metrics.psnr)),
-        ("flip", json!(metrics.flip)),
-        ("max_abs", json!(max.map(|max| max.value))),
+        number(Metric::Flip),
+        number(Metric::MaxAbs),
         ("max_abs_pixel", json!(max.map(|max| [max.pixel.0, max.pixel.1]))),
         ("max_abs_channel", json!(max.and_then(|max| ["R", "G", "B"].get(max.channel)))),
-        ("differing_pixels", json!(metrics.differing_pixels)),
+        (Metric::DifferingPixels.name(), json!(metrics.differing_pixels)),
         ("non_finite_pixels", json!(metrics.non_finite_pixels)),
         ("reference_non_finite_pixels", json!(metrics.reference_non_finite_pixels)),
         ("mean", json!(metrics.mean)),

@@ -165,7 +165,7 @@ pub enum CommandError {
 /// An error and its causes in one line: `a: b: c`.
 ///
 /// Errors of the library name their cause in their own text, where it is not repeated. The system's numbers of errors,
-/// which tell a user nothing, are left out.
+/// which mean nothing to a user, are left out.
 pub fn describe(error: &dyn Error) -> String {
     let mut text = without_number(error);
     let mut cause = error.source();

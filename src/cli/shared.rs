@@ -79,7 +79,7 @@ impl ThreadArgs {
 /// What traces the rays of a command.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct BackendArgs {
-    /// Library that traces the rays, where the command doesn't compare them
+    /// Library that traces the rays
     #[arg(long, default_value_t, value_parser = named::<BackendChoice>())]
     pub backend: BackendChoice,
 }
@@ -87,8 +87,7 @@ pub struct BackendArgs {
 /// How much memory a scene may take.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct MemoryArgs {
-    /// Refuse a scene that would take more memory while it is built, in all backends of the command together, by an
-    /// estimate: 500M, 8G
+    /// Refuse a scene that would take more memory while it is built, by an estimate: 500M, 8G
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     memory_limit: Option<u64>,
 }

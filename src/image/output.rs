@@ -3,18 +3,16 @@
 //! A destination is checked when it is named, before hours of rendering, and written at the end under a temporary
 //! name in the same directory, which then replaces the destination in one step.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+
+use tempfile::NamedTempFile;
 
 use super::exr::SampleType;
 use super::{Image, ImageError, exr, png};
 
-/// Distinguishes temporary files of one process.
-static SERIAL: AtomicU32 = AtomicU32::new(0);
-
-/// A file that can be written, as far as a check beforehand can tell.
+/// A file that can be written, as far as a check beforehand shows.
 #[derive(Clone, Debug)]
 pub struct OutputFile {
     /// As the user named it, for messages.
@@ -56,8 +54,8 @@ impl OutputFile {
             Err(_) => {}
         }
         let output = Self { named: path.to_path_buf(), resolved, directory };
-        // Only an attempt tells whether the directory takes files: permissions, read-only and full file systems.
-        output.create_temporary().map_err(|error| refuse(error.to_string()))?;
+        // Only an attempt shows whether the directory takes files: permissions, read-only and full file systems.
+        output.create_temporary().map_err(|error| refuse(reason(&error)))?;
         Ok(output)
     }
 
@@ -74,51 +72,37 @@ impl OutputFile {
     pub fn write(&self, bytes: &[u8]) -> Result<(), ImageError> {
         let write = || {
             let mut temporary = self.create_temporary()?;
-            temporary.file.write_all(bytes)?;
-            temporary.rename_to(&self.resolved)
+            temporary.write_all(bytes)?;
+            temporary.persist(&self.resolved)?;
+            Ok(())
         };
         write().map_err(|error: std::io::Error| ImageError::Write {
             path: self.named.clone(),
-            cause: error.to_string(),
+            cause: reason(&error),
         })
     }
 
-    fn create_temporary(&self) -> std::io::Result<Temporary> {
+    /// An empty file in the same directory. It vanishes when dropped, unless it replaces the destination.
+    fn create_temporary(&self) -> std::io::Result<NamedTempFile> {
         let name = self.resolved.file_name().unwrap_or_default().to_string_lossy();
         // File systems limit names to 255 bytes; some of the name is enough to recognise it.
-        let name: String = name.chars().take(32).collect();
-        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
-        let path = self.directory.join(format!(".{name}.{}-{serial}.tmp", std::process::id()));
-        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
-        Ok(Temporary { path, file, keep: false })
+        let prefix = format!(".{}.", name.chars().take(32).collect::<String>());
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".tmp");
+        // Temporary files are the user's alone; this one gets the permissions of any new file, less the umask.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.tempfile_in(&self.directory)
     }
 }
 
-/// A file that vanishes when dropped, unless it was renamed.
-struct Temporary {
-    path: PathBuf,
-    file: File,
-    keep: bool,
+/// The system's reason, without the temporary file's name.
+fn reason(error: &std::io::Error) -> String {
+    let cause = error.get_ref().and_then(|error| error.source());
+    cause.map_or_else(|| error.to_string(), ToString::to_string)
 }
 
-impl Temporary {
-    fn rename_to(mut self, destination: &Path) -> std::io::Result<()> {
-        fs::rename(&self.path, destination)?;
-        self.keep = true;
-        Ok(())
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        if !self.keep {
-            // Nothing can be done about a failure here, and the error that led here is already being reported.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-/// The formats that pictures are written in.
+/// The formats that images are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {
     /// OpenEXR: linear light, half or float.
@@ -127,18 +111,18 @@ pub enum ImageFormat {
     Png,
 }
 
-/// How a picture is written.
+/// How an image is written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageOptions {
     /// Precision of EXR files.
     pub sample_type: SampleType,
     /// Exposure of PNG files in stops.
     pub exposure: f32,
-    /// Names and values stored in the file: version, backend, settings, seconds.
+    /// Names and values stored in the file: version, backend, settings.
     pub metadata: Vec<(String, String)>,
 }
 
-/// A picture file that can be written.
+/// An image file that can be written.
 #[derive(Clone, Debug)]
 pub struct OutputTarget {
     file: OutputFile,
@@ -159,7 +143,7 @@ impl OutputTarget {
             _ => {
                 return Err(ImageError::Write {
                     path: path.to_path_buf(),
-                    cause: "the name of a picture ends in .exr or .png".to_owned(),
+                    cause: "the name of an image ends in .exr or .png".to_owned(),
                 });
             }
         };
@@ -176,7 +160,7 @@ impl OutputTarget {
         &self.file
     }
 
-    /// The format that the picture will have.
+    /// The format that the image will have.
     pub fn format(&self) -> ImageFormat {
         self.format
     }

@@ -5,7 +5,9 @@ mod common;
 
 mod awkward;
 mod bench;
+mod command_line;
 mod compare;
 mod gallery;
 mod memory;
+mod same_bytes;
 mod views;
