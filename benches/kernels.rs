@@ -8,18 +8,21 @@ use std::sync::Arc;
 
 use divan::{Bencher, black_box};
 use glam::{Vec3, Vec4};
+use lightmesh::World;
 use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, RayPacket};
-use lightmesh::light_mesh::{
-    Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
-    Scratch, directional,
+use lightmesh::light_mesh::direct::{
+    Basis, DirectField, DirectMesh, DirectShading, DirectView, spherical_harmonics,
 };
+use lightmesh::light_mesh::lookup::{Lookup, LookupScratch};
+use lightmesh::light_mesh::points::Neighbours;
+use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{
     Instance, LightShape, Material, PointLight, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
     TriangleMesh,
 };
-use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, PointSettings, Radius, Spacing};
-use lightmesh::simd::vectorize;
+use lightmesh::settings::{Estimator, KernelSettings, Leaks, PointSettings, Radius, Spacing};
+use lightmesh::simd::{LANES, vectorize};
 use pulp::NullaryFnOnce;
 
 fn main() {
@@ -70,42 +73,45 @@ fn surfaces() -> Vec<SurfacePoint> {
     (0..SURFACES).map(surface).collect()
 }
 
-/// Spacing 1/20, R of `spacings` spacings.
-fn point_settings(spacings: f32) -> PointSettings {
-    PointSettings {
-        spacing: Spacing::Units(Vec3::splat(0.05)),
+/// A mesh of spacing 1/20 over the scene of a number of lights, read with R of `spacings` spacings.
+fn mesh(lights: usize, spacings: f32, estimator: Estimator) -> (DirectMesh, DirectShading) {
+    let points = PointSettings { spacing: Spacing::Units(Vec3::splat(0.05)), ..PointSettings::default() };
+    let kernel = KernelSettings {
         radius: Radius::Spacings(spacings),
         leaks: Leaks::Allow,
-        ..PointSettings::default()
-    }
+        ..KernelSettings::default()
+    };
+    let mut mesh = DirectMesh::new(scene(lights).bounds());
+    let shading = mesh.shading(&points, &kernel, estimator).expect("a modest grid");
+    (mesh, shading)
 }
 
 /// Finding D_y by a search for each surface point.
 #[divan::bench(args = [1.5, 3.0])]
 fn gather(bencher: Bencher, spacings: f32) {
-    let points = MeshPoints::new(scene(1).bounds(), &point_settings(spacings)).expect("a modest grid");
+    let (mesh, shading) = mesh(1, spacings, Estimator::PerLight);
     let surfaces = surfaces();
     let mut neighbours = Neighbours::default();
     bencher.counter(SURFACES).bench_local(|| {
         for surface in &surfaces {
-            points.neighbours(black_box(surface), &mut neighbours);
+            shading.neighbourhoods.find(&mesh.store().points, black_box(surface), &mut neighbours);
         }
         neighbours.ids().len()
     });
 }
 
-/// Finding the points of all D_y, by a search for each cube.
+/// Finding the points of all D_y, by a search for each cell.
 #[divan::bench(args = [1.5, 3.0])]
 fn needed(bencher: Bencher, spacings: f32) {
-    let points = MeshPoints::new(scene(1).bounds(), &point_settings(spacings)).expect("a modest grid");
+    let (mesh, shading) = mesh(1, spacings, Estimator::PerLight);
+    let lights = PackedLights::of_scene(&scene(1));
+    let lookup = mesh.view(&lights, &shading).lookup;
     let surfaces = surfaces();
-    bencher
-        .counter(SURFACES)
-        .bench_local(|| vectorize(Needed { points: &points, surfaces: black_box(&surfaces) }));
+    bencher.counter(SURFACES).bench_local(|| vectorize(Needed { lookup, surfaces: black_box(&surfaces) }));
 }
 
 struct Needed<'a> {
-    points: &'a MeshPoints,
+    lookup: Lookup<'a>,
     surfaces: &'a [SurfacePoint],
 }
 
@@ -114,7 +120,7 @@ impl NullaryFnOnce for Needed<'_> {
 
     #[inline(always)]
     fn call(self) -> usize {
-        self.points.needed(self.surfaces.iter()).len()
+        self.lookup.needed(self.surfaces.iter()).into_bricks().count()
     }
 }
 
@@ -122,13 +128,13 @@ impl NullaryFnOnce for Needed<'_> {
 #[divan::bench(args = [16, 100, 1000])]
 fn illuminate(bencher: Bencher, lights: usize) {
     let scene = scene(lights);
-    let table = LightTable::of_scene(&scene);
+    let table = PackedLights::of_scene(&scene);
     let surfaces = surfaces();
     bencher.counter(SURFACES).bench_local(|| vectorize(Illuminate { table: &table, surfaces: &surfaces }));
 }
 
 struct Illuminate<'a> {
-    table: &'a LightTable,
+    table: &'a PackedLights,
     surfaces: &'a [SurfacePoint],
 }
 
@@ -139,7 +145,7 @@ impl NullaryFnOnce for Illuminate<'_> {
     fn call(self) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for surface in self.surfaces {
-            sum += self.table.illuminate(black_box(surface), |_| Some([1.0; LANES]));
+            sum += self.table.irradiance(black_box(surface), |_| Some([1.0; LANES]));
         }
         sum
     }
@@ -148,26 +154,28 @@ impl NullaryFnOnce for Illuminate<'_> {
 /// Irradiance of a normal from the directional basis.
 #[divan::bench]
 fn irradiance(bencher: Bencher) {
-    let coefficients = [Vec4::splat(0.1); directional::COEFFICIENTS];
+    let coefficients = [Vec4::splat(0.1); spherical_harmonics::COEFFICIENTS];
     let surfaces = surfaces();
     bencher.counter(SURFACES).bench_local(|| {
         let light = |surface: &SurfacePoint| {
-            directional::irradiance(black_box(&coefficients), surface.shading_normal)
+            spherical_harmonics::irradiance(black_box(&coefficients), surface.shading_normal)
         };
         surfaces.iter().map(light).sum::<Vec3>()
     });
 }
 
-/// Tracing and summing up at mesh points, by what is kept.
-#[divan::bench(args = [Basis::Bits, Basis::Scalar, Basis::Directional])]
+/// Tracing and summing up at mesh points, by what is derived.
+#[divan::bench(args = [Basis::Bits, Basis::Light, Basis::Irradiance])]
 fn evaluate(bencher: Bencher, basis: Basis) {
     let scene = scene(100);
     let accel = BvhAccel::build(&scene).expect("finite triangles");
-    let table = LightTable::of_scene(&scene);
+    let table = PackedLights::of_scene(&scene);
     let points: Vec<Vec3> = surfaces().iter().map(|surface| surface.position).collect();
     bencher.counter(points.len()).bench_local(|| {
-        let mut values = DirectValues::default();
-        values.evaluate(&accel, &table, basis, black_box(&points))
+        let mut field = DirectField::default();
+        let rays = field.trace(&accel, &table, black_box(&points));
+        field.derive(&table, basis, &points);
+        rays
     });
 }
 
@@ -176,28 +184,24 @@ fn evaluate(bencher: Bencher, basis: Basis) {
 fn shade(bencher: Bencher, estimator: Estimator) {
     let scene = scene(100);
     let accel = BvhAccel::build(&scene).expect("finite triangles");
-    let settings =
-        LightMeshSettings { points: point_settings(1.5), estimator, ..LightMeshSettings::default() };
-    let mut mesh = DirectMesh::new(&scene, &settings).expect("a modest grid");
+    let (lights, emissive) = (PackedLights::of_scene(&scene), EmissiveTriangles::default());
+    let world = World { accel: &accel, scene: &scene, lights: &lights, emissive: &emissive };
+    let (mut mesh, shading) = mesh(100, 1.5, estimator);
     let surfaces = surfaces();
-    let mut needed = NeededPoints::default();
-    let mut neighbours = Neighbours::default();
-    for surface in &surfaces {
-        mesh.points.neighbours(surface, &mut neighbours);
-        neighbours.ids().iter().for_each(|&id| needed.insert(id));
-    }
-    mesh.evaluate(&accel, &scene, &PointMask::union(needed.into_bricks()));
-    let mut scratch = Scratch::for_tile();
-    bencher.counter(SURFACES).bench_local(|| {
-        vectorize(Shade { mesh: &mesh, accel: &accel, surfaces: &surfaces, scratch: &mut scratch })
-    });
+    let needed = mesh.view(&lights, &shading).lookup.needed_anywhere(surfaces.iter());
+    mesh.evaluate(world, &shading, &needed);
+    let view = mesh.view(&lights, &shading);
+    let mut scratch = LookupScratch::for_tile();
+    bencher
+        .counter(SURFACES)
+        .bench_local(|| vectorize(Shade { view, accel: &accel, surfaces: &surfaces, scratch: &mut scratch }));
 }
 
 struct Shade<'a> {
-    mesh: &'a DirectMesh,
+    view: DirectView<'a>,
     accel: &'a BvhAccel,
     surfaces: &'a [SurfacePoint],
-    scratch: &'a mut Scratch,
+    scratch: &'a mut LookupScratch,
 }
 
 impl NullaryFnOnce for Shade<'_> {
@@ -207,7 +211,7 @@ impl NullaryFnOnce for Shade<'_> {
     fn call(self) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for surface in self.surfaces {
-            sum += self.mesh.illumination(self.accel, surface, self.scratch);
+            sum += self.view.illumination(self.accel, surface, self.scratch);
         }
         sum
     }

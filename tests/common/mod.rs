@@ -8,16 +8,20 @@ pub mod triangles;
 use std::sync::Arc;
 
 use glam::Vec3;
+use lightmesh::World;
 use lightmesh::accel::{Backend, BackendChoice, BvhAccel};
-use lightmesh::light_mesh::{DirectMesh, NeededPoints, Neighbours, PointMask, Scratch};
-use lightmesh::render::{Film, LightMeshes, RenderStats, render, render_light_mesh};
+use lightmesh::image::Image;
+use lightmesh::light_mesh::direct::DirectMesh;
+use lightmesh::light_mesh::lookup::LookupScratch;
+use lightmesh::lights::{EmissiveTriangles, PackedLights};
+use lightmesh::render::{RenderStats, Session, render};
 use lightmesh::scene::generate::forest::Forest;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
 use lightmesh::scene::{
     Camera, Falloff, Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint,
     TriangleMaterials, TriangleMesh,
 };
-use lightmesh::settings::{Integrator, LightMeshSettings, Settings};
+use lightmesh::settings::{Integrator, Settings};
 
 /// Triangles by hand, with a material each.
 #[derive(Default)]
@@ -98,24 +102,27 @@ pub fn backend(scene: &Scene) -> Backend {
 }
 
 /// Renders with the integrator that the settings name.
-pub fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Film, RenderStats) {
-    render(&backend(scene), scene, camera, settings, &()).expect("a picture")
+pub fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Image, RenderStats) {
+    render(&backend(scene), scene, camera, settings).expect("a picture")
 }
 
-/// The same with light meshes that outlive the render.
-pub fn picture_with(
-    backend: &Backend,
-    scene: &Scene,
-    camera: &Camera,
-    settings: &Settings,
-    meshes: &mut LightMeshes,
-) -> (Film, RenderStats) {
-    render_light_mesh(backend, scene, camera, settings, meshes, &())
+/// A session, with the best backend there is.
+pub fn session(scene: &Scene) -> Session {
+    Session::new(scene.clone(), BackendChoice::Auto).expect("a sound scene")
+}
+
+/// The default settings at a resolution.
+pub fn settings_at(resolution: (u32, u32)) -> Settings {
+    let mut settings = Settings::default();
+    settings.view.resolution = resolution;
+    settings
 }
 
 /// The conventional picture with otherwise the same settings.
-pub fn conventional(scene: &Scene, camera: &Camera, settings: &Settings) -> (Film, RenderStats) {
-    picture(scene, camera, &Settings { integrator: Integrator::Conventional, ..settings.clone() })
+pub fn conventional(scene: &Scene, camera: &Camera, settings: &Settings) -> (Image, RenderStats) {
+    let mut settings = settings.clone();
+    settings.shading.integrator = Integrator::Conventional;
+    picture(scene, camera, &settings)
 }
 
 /// A surface point in free space.
@@ -123,24 +130,26 @@ pub fn surface_point(position: Vec3, normal: Vec3) -> SurfacePoint {
     SurfacePoint::flat(position, normal)
 }
 
-/// I(y) at surface points, which need not lie on any geometry.
-pub fn direct_illumination(
-    scene: &Scene,
-    settings: &LightMeshSettings,
-    surfaces: &[SurfacePoint],
-) -> Vec<Vec3> {
-    let mut mesh = DirectMesh::new(scene, settings).expect("a light mesh");
-    let mut needed = NeededPoints::default();
-    let mut neighbours = Neighbours::default();
-    for surface in surfaces {
-        mesh.points.neighbours(surface, &mut neighbours);
-        neighbours.ids().iter().for_each(|&id| needed.insert(id));
-    }
-    let needed = PointMask::union(needed.into_bricks());
-    let mut scratch = Scratch::default();
+/// Calls `each` with the World of a scene in the BVH.
+pub fn with_world<T>(scene: &Scene, each: impl FnOnce(World<BvhAccel>) -> T) -> T {
     let accel = BvhAccel::build(scene).expect("a BVH");
-    mesh.evaluate(&accel, scene, &needed);
-    surfaces.iter().map(|surface| mesh.illumination(&accel, surface, &mut scratch)).collect()
+    let (lights, emissive) = (PackedLights::of_scene(scene), EmissiveTriangles::of_scene(scene));
+    each(World { accel: &accel, scene, lights: &lights, emissive: &emissive })
+}
+
+/// I(y) at surface points, which need not lie on any geometry.
+pub fn direct_illumination(scene: &Scene, settings: &Settings, surfaces: &[SurfacePoint]) -> Vec<Vec3> {
+    with_world(scene, |world| {
+        let mut mesh = DirectMesh::new(scene.bounds());
+        let shading = &settings.shading;
+        let shading = mesh.shading(&settings.mesh.direct, &shading.kernel, shading.estimator);
+        let shading = shading.expect("a light mesh");
+        let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
+        mesh.evaluate(world, &shading, &needed);
+        let view = mesh.view(world.lights, &shading);
+        let mut scratch = LookupScratch::default();
+        surfaces.iter().map(|surface| view.illumination(world.accel, surface, &mut scratch)).collect()
+    })
 }
 
 /// The generated forest as `lightmesh generate forest` writes it.
@@ -151,25 +160,25 @@ pub fn forest(triangles: u32, lights: u32) -> LoadedScene {
 }
 
 /// Mean over pixels and channels.
-pub fn mean(film: &Film) -> f64 {
-    let sum: f64 = film.pixels.iter().flatten().map(|&value| f64::from(value)).sum();
-    sum / (3 * film.pixels.len()) as f64
+pub fn mean(image: &Image) -> f64 {
+    let sum: f64 = image.pixels().iter().flatten().map(|&value| f64::from(value)).sum();
+    sum / (3 * image.pixels().len()) as f64
 }
 
 /// Root of the mean squared difference over the mean of `reference`.
-pub fn relative_rmse(film: &Film, reference: &Film) -> f64 {
-    assert_eq!(film.resolution, reference.resolution);
-    let squares: f64 = film
-        .pixels
+pub fn relative_rmse(image: &Image, reference: &Image) -> f64 {
+    assert_eq!((image.width(), image.height()), (reference.width(), reference.height()));
+    let squares: f64 = image
+        .pixels()
         .iter()
         .flatten()
-        .zip(reference.pixels.iter().flatten())
+        .zip(reference.pixels().iter().flatten())
         .map(|(a, b)| f64::from(a - b).powi(2))
         .sum();
-    (squares / (3 * film.pixels.len()) as f64).sqrt() / mean(reference)
+    (squares / (3 * image.pixels().len()) as f64).sqrt() / mean(reference)
 }
 
 /// The bits of all channels: equal exactly if the pictures are.
-pub fn bits(film: &Film) -> Vec<u32> {
-    film.pixels.iter().flatten().map(|value| value.to_bits()).collect()
+pub fn bits(image: &Image) -> Vec<u32> {
+    image.pixels().iter().flatten().map(|value| value.to_bits()).collect()
 }

@@ -5,7 +5,8 @@ use std::fs;
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::choose_view;
-use lightmesh::render::{Film, render};
+use lightmesh::image::Image;
+use lightmesh::render::render;
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::load::open_scene;
 
@@ -42,18 +43,18 @@ fn model() -> Soup {
 fn obj_ply_and_gltf_give_the_same_picture() {
     let soup = model();
     let folder = tempfile::tempdir().unwrap();
-    let picture = |name: &str, content: &[u8]| -> Film {
+    let picture = |name: &str, content: &[u8]| -> Image {
         let file = folder.path().join(name);
         fs::write(&file, content).unwrap();
         let mut opened = open_scene(&file).unwrap();
-        opened.loaded.settings.resolution = (120, 90);
+        opened.loaded.settings.view.resolution = (120, 90);
         let backend = Backend::build(BackendChoice::Auto, &opened.loaded.scene).unwrap().backend;
         let loaded = choose_view(&opened, &backend).complete(opened).loaded;
-        render(&backend, &loaded.scene, &loaded.cameras[0], &loaded.settings, &()).unwrap().0
+        render(&backend, &loaded.scene, &loaded.cameras[0], &loaded.settings).unwrap().0
     };
     let obj = picture("model.obj", soup.obj().as_bytes());
-    let lit = obj.pixels.iter().filter(|pixel| pixel[0] > 0.0).count();
-    assert!(lit * 10 > obj.pixels.len(), "{lit} of {} pixels show something", obj.pixels.len());
+    let lit = obj.pixels().iter().filter(|pixel| pixel[0] > 0.0).count();
+    assert!(lit * 10 > obj.pixels().len(), "{lit} of {} pixels show something", obj.pixels().len());
     for (name, content) in [
         ("ascii.ply", soup.ply("ascii")),
         ("little.ply", soup.ply("binary_little_endian")),

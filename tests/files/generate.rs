@@ -21,7 +21,7 @@ fn forests_have_exactly_the_triangles_and_lights_asked_for() {
         assert_eq!(count, triangles as usize);
         assert_eq!(loaded.scene.lights.len(), lights as usize);
         assert!(loaded.warnings.is_empty() && loaded.skipped.is_empty(), "{:?}", loaded.warnings);
-        assert_eq!(loaded.settings.resolution, (600, 600));
+        assert_eq!(loaded.settings.view.resolution, (600, 600));
     }
 }
 

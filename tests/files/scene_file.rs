@@ -159,7 +159,7 @@ fn mistakes_name_file_line_and_key() {
         ("background = -1", "1: background: must not be negative"),
         ("background = 1e39", "1: background: must be a finite"),
         ("colour = 1", "1: colour: unknown key"),
-        ("falloff = \"cubic\"", "1: falloff: unknown variant"),
+        ("falloff = \"cubic\"", "1: falloff: unknown name `cubic`"),
         ("falloff = \"none\"\nfalloff_constant = 2", "2: falloff_constant: needs falloff"),
         ("[render]\nspp = 0", "2: render.spp: must lie in [1, 65536], found 0"),
         ("[render]\nspp = \"four\"", "2: render.spp: invalid type"),
@@ -285,39 +285,46 @@ layout = \"body-centred\"
     assert_eq!(scene.scene.background, Vec3::new(1.0, 2.0, 3.0));
     assert_eq!(scene.scene.falloff, Falloff::Linear { constant: 0.5 });
     let settings = scene.settings;
-    assert_eq!(settings.integrator, Integrator::Conventional);
-    assert_eq!((settings.resolution, settings.samples_per_pixel, settings.max_depth), ((60, 40), 4, 3));
-    assert_eq!((settings.weight_threshold, settings.exposure), (0.25, -1.5));
-    let mesh = settings.light_mesh;
-    assert_eq!((mesh.estimator, mesh.resolve), (Estimator::Ratio, Resolve::Trace));
-    assert_eq!(mesh.points.layout, PointLayout::Jittered { seed: 9 });
-    assert_eq!(mesh.points.spacing, Spacing::Units(Vec3::new(1.0, 2.0, 3.0)));
-    assert_eq!((mesh.points.radius, mesh.points.neighbourhood), (Radius::Units(4.0), Neighbourhood::Nearest));
-    assert_eq!((mesh.points.hemisphere, mesh.points.leaks), (false, Leaks::Allow));
-    assert_eq!(mesh.points.regions.len(), 1);
-    assert_eq!(mesh.points.regions[0].spacing, Some(Vec3::splat(0.5)));
+    assert_eq!(settings.shading.integrator, Integrator::Conventional);
+    assert_eq!(
+        (settings.view.resolution, settings.view.samples_per_pixel, settings.view.max_depth),
+        ((60, 40), 4, 3)
+    );
+    assert_eq!((settings.view.weight_threshold, settings.output.exposure), (0.25, -1.5));
+    let (mesh, shading) = (settings.mesh, settings.shading);
+    let (kernel, indirect_kernel) = (&shading.kernel, &shading.indirect.kernel);
+    assert_eq!((shading.estimator, shading.resolve), (Estimator::Ratio, Resolve::Trace));
+    assert_eq!(mesh.direct.layout, PointLayout::Jittered { seed: 9 });
+    assert_eq!(mesh.direct.spacing, Spacing::Units(Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!((kernel.radius, kernel.neighbourhood), (Radius::Units(4.0), Neighbourhood::Nearest));
+    assert_eq!((kernel.hemisphere, kernel.leaks), (false, Leaks::Allow));
+    assert_eq!(mesh.direct.regions.len(), 1);
+    assert_eq!(mesh.direct.regions[0].spacing, Some(Vec3::splat(0.5)));
     let indirect = mesh.indirect.expect("its table is there");
-    assert_eq!((indirect.emitter_samples, indirect.at_surface), (0, true));
+    assert_eq!((indirect.emitter_samples, shading.indirect.at_surface), (0, true));
     assert_eq!((indirect.directions, indirect.bounces, indirect.tolerance), (64, 2, 0.125));
-    assert_eq!((indirect.form, indirect.normalization), (IndirectForm::Scalar, Normalization::Integral));
+    assert_eq!(
+        (indirect.form, shading.indirect.normalization),
+        (IndirectForm::Scalar, Normalization::Integral)
+    );
     assert_eq!(indirect.points.layout, PointLayout::BodyCentred);
-    assert_eq!((indirect.points.spacing, indirect.points.radius), (Spacing::Auto, Radius::Spacings(3.0)));
-    assert_eq!((indirect.points.hemisphere, indirect.points.regions.len()), (false, 1), "as the direct mesh");
+    assert_eq!((indirect.points.spacing, indirect_kernel.radius), (Spacing::Auto, Radius::Spacings(3.0)));
+    assert_eq!((indirect_kernel.hemisphere, indirect.points.regions.len()), (false, 1), "as the direct mesh");
 }
 
 #[test]
 fn the_physical_preset_changes_defaults_only() {
     let scene = loaded("preset = \"physical\"\n[light_mesh]\nestimator = \"directional\"");
     assert_eq!(scene.scene.falloff, Falloff::InverseSquare);
-    assert!(scene.settings.lambertian && scene.settings.light_mesh.indirect.is_some());
-    assert_eq!(scene.settings.light_mesh.estimator, Estimator::Directional);
+    assert!(scene.settings.shading.lambertian && scene.settings.mesh.indirect.is_some());
+    assert_eq!(scene.settings.shading.estimator, Estimator::Directional);
     assert_eq!(loaded("preset = \"physical\"\nfalloff = \"none\"").scene.falloff, Falloff::None);
 }
 
 #[test]
 fn points_come_from_a_file() {
     let scene = loaded("[light_mesh]\npoints_file = \"points.csv\"");
-    let PointLayout::List(points) = scene.settings.light_mesh.points.layout else { panic!("not a list") };
+    let PointLayout::List(points) = scene.settings.mesh.direct.layout else { panic!("not a list") };
     assert_eq!(*points, [Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)]);
 }
 

@@ -9,9 +9,8 @@ use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use lightmesh::scene::load::load_model;
 use lightmesh::scene::{Falloff, Scene};
-use lightmesh::settings::Settings;
 
-use crate::common::{camera, conventional, light};
+use crate::common::{camera, conventional, light, settings_at};
 
 /// Upper left red, upper right green; lower left blue, lower right nothing.
 const TEXELS: [[u8; 4]; 4] = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 0]];
@@ -94,7 +93,7 @@ fn pictures_stand_upright_and_alpha_masks_let_sight_and_light_pass() {
     let folder = tempfile::tempdir().unwrap();
     write_obj(folder.path());
     write_gltf(folder.path());
-    let settings = Settings { resolution: (80, 80), ..Settings::default() };
+    let settings = settings_at((80, 80));
     for name in ["model.obj", "model.gltf"] {
         let model = load_model(&folder.path().join(name)).unwrap();
         assert!(model.warnings.is_empty(), "{name}: {:?}", model.warnings);
@@ -109,8 +108,8 @@ fn pictures_stand_upright_and_alpha_masks_let_sight_and_light_pass() {
         };
         // The square fills the middle half of the picture: its quarters' middles are 10 pixels from the centre.
         let camera = camera(eye, Vec3::ZERO, 2.0 * (2.0f32 / 4.0).atan().to_degrees());
-        let (film, _) = conventional(&scene, &camera, &settings);
-        let seen = |x: usize, y: usize| film.pixels[y * 80 + x].map(|value| value > 0.5);
+        let (image, _) = conventional(&scene, &camera, &settings);
+        let seen = |x: usize, y: usize| image.pixels()[y * 80 + x].map(|value| value > 0.5);
         assert_eq!(seen(30, 30), [true, false, false], "{name}: upper left");
         assert_eq!(seen(50, 30), [false, true, false], "{name}: upper right");
         assert_eq!(seen(30, 50), [false, false, true], "{name}: lower left");

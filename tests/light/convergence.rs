@@ -4,7 +4,9 @@ use glam::Vec3;
 use lightmesh::scene::Falloff;
 use lightmesh::settings::{Neighbourhood, Radius, Settings, Spacing};
 
-use crate::common::{Builder, camera, conventional, forest, grey, light, picture, relative_rmse};
+use crate::common::{
+    Builder, camera, conventional, forest, grey, light, picture, relative_rmse, settings_at,
+};
 
 /// RMSE against the conventional picture over its mean, for R and a spacing of R/`density`, halved `steps` times.
 fn errors(
@@ -20,8 +22,8 @@ fn errors(
         .map(|step| {
             let radius = radius * 0.5f32.powi(step);
             let mut settings = settings.clone();
-            settings.light_mesh.points.radius = Radius::Units(radius);
-            settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(radius / density));
+            settings.shading.kernel.radius = Radius::Units(radius);
+            settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(radius / density));
             relative_rmse(&picture(scene, camera, &settings).0, &reference)
         })
         .collect()
@@ -38,8 +40,8 @@ fn the_error_of_one_shadow_edge_falls_with_the_root_of_the_radius() {
         builder.scene(vec![grey(0.8)], vec![light(Vec3::new(0.4, 9.0, 0.3), Vec3::ONE)], Falloff::None);
     let camera = camera(Vec3::new(4.5, 2.5, 0.2), Vec3::new(0.2, 0.0, 0.0), 50.0);
     for neighbourhood in [Neighbourhood::Sphere, Neighbourhood::SmoothSphere] {
-        let mut settings = Settings { resolution: (160, 120), ..Settings::default() };
-        settings.light_mesh.points.neighbourhood = neighbourhood;
+        let mut settings = settings_at((160, 120));
+        settings.shading.kernel.neighbourhood = neighbourhood;
         let errors = errors(&scene, &camera, &settings, 0.8, 4.0, 3);
         for pair in errors.windows(2) {
             let ratio = pair[1] / pair[0];
@@ -52,7 +54,7 @@ fn the_error_of_one_shadow_edge_falls_with_the_root_of_the_radius() {
 #[test]
 fn the_error_of_the_forest_falls_with_the_root_of_the_radius() {
     let loaded = forest(23_542, 100);
-    let settings = Settings { resolution: (150, 150), ..Settings::default() };
+    let settings = settings_at((150, 150));
     let errors = errors(&loaded.scene, &loaded.cameras[0], &settings, 0.4, 2.0, 3);
     for pair in errors.windows(2) {
         let ratio = pair[1] / pair[0];

@@ -6,7 +6,7 @@ use lightmesh::settings::{
     Estimator, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
 };
 
-use crate::common::{bits, forest, picture};
+use crate::common::{bits, forest, picture, settings_at};
 
 fn scene() -> LoadedScene {
     let mut loaded = forest(3_000, 20);
@@ -18,10 +18,11 @@ fn scene() -> LoadedScene {
 /// The settings that take different ways through the renderer.
 fn variants() -> Vec<(&'static str, Settings)> {
     // No multiple of the tile size, several blocks, several samples.
-    let base = Settings { resolution: (75, 67), samples_per_pixel: 2, ..Settings::default() };
+    let mut base = settings_at((75, 67));
+    base.view.samples_per_pixel = 2;
     let variant = |name, change: &dyn Fn(&mut Settings)| {
         let mut settings = base.clone();
-        settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.5));
+        settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.5));
         change(&mut settings);
         (name, settings)
     };
@@ -31,15 +32,15 @@ fn variants() -> Vec<(&'static str, Settings)> {
         Some(indirect)
     };
     vec![
-        variant("conventional", &|s| s.integrator = Integrator::Conventional),
+        variant("conventional", &|s| s.shading.integrator = Integrator::Conventional),
         variant("per-light", &|_| {}),
-        variant("directional", &|s| s.light_mesh.estimator = Estimator::Directional),
-        variant("invalidated points", &|s| s.light_mesh.points.leaks = Leaks::Invalidate),
-        variant("blue noise", &|s| s.light_mesh.points.layout = PointLayout::BlueNoise { seed: 3 }),
-        variant("hybrid", &|s| s.light_mesh.resolve = Resolve::Trace),
-        variant("one bounce", &|s| s.light_mesh.indirect = indirect()),
+        variant("directional", &|s| s.shading.estimator = Estimator::Directional),
+        variant("invalidated points", &|s| s.shading.kernel.leaks = Leaks::Invalidate),
+        variant("blue noise", &|s| s.mesh.direct.layout = PointLayout::BlueNoise { seed: 3 }),
+        variant("hybrid", &|s| s.shading.resolve = Resolve::Trace),
+        variant("one bounce", &|s| s.mesh.indirect = indirect()),
         variant("three bounces", &|s| {
-            s.light_mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, ..indirect });
+            s.mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, ..indirect });
         }),
     ]
 }
@@ -64,7 +65,8 @@ fn the_block_size_changes_no_bit() {
         let whole = bits(&picture(&loaded.scene, &loaded.cameras[0], &settings).0);
         // One tile at a time, and a few tiles at a time.
         for pixels in [1, 5_000] {
-            let settings = Settings { block_pixels: Some(pixels), ..settings.clone() };
+            let mut settings = settings.clone();
+            settings.view.block_samples = Some(pixels * 2);
             let blocks = bits(&picture(&loaded.scene, &loaded.cameras[0], &settings).0);
             assert!(blocks == whole, "{name}, blocks of {pixels} pixels");
         }

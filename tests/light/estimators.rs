@@ -6,13 +6,12 @@ use std::sync::Arc;
 use glam::Vec3;
 use lightmesh::scene::{Falloff, Scene};
 use lightmesh::settings::{
-    Estimator, Leaks, LightMeshSettings, Neighbourhood, PointLayout, PointSettings, Radius, Resolve,
-    Settings, Spacing,
+    Estimator, KernelSettings, Leaks, Neighbourhood, PointLayout, Radius, Settings, Spacing,
 };
 
 use crate::common::{
     Builder, conventional, direct_illumination, forest, grey, light, mean, picture, relative_rmse,
-    surface_point,
+    settings_at, surface_point,
 };
 
 const ALL: [Estimator; 4] = [Estimator::Paper, Estimator::Ratio, Estimator::PerLight, Estimator::Directional];
@@ -29,20 +28,17 @@ fn two_lights() -> Scene {
 }
 
 /// The mesh points of the hand-worked examples: (0, 0, 0) sees both lights, (1, 0, 0) only A.
-fn two_points(estimator: Estimator) -> LightMeshSettings {
-    LightMeshSettings {
-        points: PointSettings {
-            layout: PointLayout::List(Arc::new(vec![Vec3::ZERO, Vec3::X])),
-            radius: Radius::Units(2.0),
-            neighbourhood: Neighbourhood::Sphere,
-            hemisphere: false,
-            leaks: Leaks::Allow,
-            ..PointSettings::default()
-        },
-        estimator,
-        resolve: Resolve::Average,
-        indirect: None,
-    }
+fn two_points(estimator: Estimator) -> Settings {
+    let mut settings = Settings::default();
+    settings.mesh.direct.layout = PointLayout::List(Arc::new(vec![Vec3::ZERO, Vec3::X]));
+    settings.shading.estimator = estimator;
+    settings.shading.kernel = KernelSettings {
+        radius: Radius::Units(2.0),
+        neighbourhood: Neighbourhood::Sphere,
+        hemisphere: false,
+        leaks: Leaks::Allow,
+    };
+    settings
 }
 
 fn assert_close(found: Vec3, expected: Vec3) {
@@ -63,7 +59,7 @@ fn s() -> Vec3 {
     A / 5.0 + B / 6.0 * 0.8
 }
 
-fn at_origin(settings: &LightMeshSettings) -> Vec3 {
+fn at_origin(settings: &Settings) -> Vec3 {
     direct_illumination(&two_lights(), settings, &[surface_point(Vec3::ZERO, Vec3::Y)])[0]
 }
 
@@ -79,7 +75,7 @@ fn paper_is_the_mean_of_direct_light_times_the_unshadowed_sum() {
 fn nearest_takes_the_value_of_one_point() {
     for (y, index) in [(Vec3::X * 0.4, 0), (Vec3::X * 0.6, 1)] {
         let mut settings = two_points(Estimator::Paper);
-        settings.points.neighbourhood = Neighbourhood::Nearest;
+        settings.shading.kernel.neighbourhood = Neighbourhood::Nearest;
         let found = direct_illumination(&two_lights(), &settings, &[surface_point(y, Vec3::Y)])[0];
         let s = [(A, Vec3::new(0.0, 4.0, 0.0)), (B, Vec3::new(3.0, 4.0, 0.0))]
             .map(|(intensity, position)| {
@@ -122,14 +118,14 @@ fn doubling_the_lights_quadruples_paper_and_doubles_the_others() {
     loaded.scene.background = Vec3::ZERO;
     let mut brighter = loaded.scene.clone();
     brighter.lights.iter_mut().for_each(|light| light.intensity *= 2.0);
-    let mut settings = Settings { resolution: (64, 64), ..Settings::default() };
+    let mut settings = settings_at((64, 64));
     for estimator in ALL {
-        settings.light_mesh.estimator = estimator;
+        settings.shading.estimator = estimator;
         let (before, _) = picture(&loaded.scene, &loaded.cameras[0], &settings);
         let (after, _) = picture(&brighter, &loaded.cameras[0], &settings);
         let factor = if estimator == Estimator::Paper { 4.0 } else { 2.0 };
         // Powers of two pass through every sum and product without rounding.
-        for (before, after) in before.pixels.iter().flatten().zip(after.pixels.iter().flatten()) {
+        for (before, after) in before.pixels().iter().flatten().zip(after.pixels().iter().flatten()) {
             assert!((after - factor * before).abs() <= 1e-5 * after.abs(), "{estimator:?}");
         }
         assert!(mean(&before) > 0.0, "{estimator:?}");
@@ -143,10 +139,10 @@ fn doubling_the_lights_quadruples_paper_and_doubles_the_others() {
 #[test]
 fn directional_is_close_to_per_light_on_the_forest() {
     let loaded = forest(23_542, 100);
-    let mut settings = Settings { resolution: (200, 200), ..Settings::default() };
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.2));
+    let mut settings = settings_at((200, 200));
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.2));
     let (per_light, _) = picture(&loaded.scene, &loaded.cameras[0], &settings);
-    settings.light_mesh.estimator = Estimator::Directional;
+    settings.shading.estimator = Estimator::Directional;
     let (directional, _) = picture(&loaded.scene, &loaded.cameras[0], &settings);
     let difference = relative_rmse(&directional, &per_light);
     assert!(difference <= 0.03, "RMSE {difference} of the mean");

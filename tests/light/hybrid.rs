@@ -1,13 +1,13 @@
 //! Hybrid shadows are the conventional tracer's for a fraction of its rays (spec §4).
 
 use glam::Vec3;
-use lightmesh::render::Film;
+use lightmesh::image::Image;
 use lightmesh::scene::Falloff;
 use lightmesh::scene::generate::interior::Interior;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
-use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Settings, Spacing};
+use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Spacing};
 
-use crate::common::{camera, conventional, forest, grey, light, picture};
+use crate::common::{camera, conventional, forest, grey, light, picture, settings_at};
 
 fn interior() -> LoadedScene {
     let folder = tempfile::tempdir().unwrap();
@@ -18,19 +18,20 @@ fn interior() -> LoadedScene {
 /// At 1200×1200 at most 1 % of the pixels differ from the conventional ones by more than 2 % of the image's mean, and at
 /// most the given share of the conventional shadow rays is traced, those of the mesh points included.
 fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32, share: f64) {
-    let mut settings = Settings { resolution: (1200, 1200), ..loaded.settings.clone() };
-    settings.light_mesh.indirect = None;
-    settings.light_mesh.resolve = Resolve::Trace;
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
-    settings.light_mesh.points.radius = Radius::Spacings(radius_in_spacings);
+    let mut settings = loaded.settings.clone();
+    settings.view.resolution = (1200, 1200);
+    settings.mesh.indirect = None;
+    settings.shading.resolve = Resolve::Trace;
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+    settings.shading.kernel.radius = Radius::Spacings(radius_in_spacings);
     let (reference, conventional) = conventional(&loaded.scene, &loaded.cameras[0], &settings);
     let (traced, hybrid) = picture(&loaded.scene, &loaded.cameras[0], &settings);
-    let mean = reference.pixels.as_flattened().iter().sum::<f32>() / (3 * reference.pixels.len()) as f32;
+    let mean = reference.pixels().as_flattened().iter().sum::<f32>() / (3 * reference.pixels().len()) as f32;
     let differ = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 0.02 * mean);
-    let differing = traced.pixels.iter().zip(&reference.pixels).filter(|&pair| differ(pair)).count();
+    let differing = traced.pixels().iter().zip(reference.pixels()).filter(|&pair| differ(pair)).count();
     let rays = hybrid.rays.shadow as f64 / conventional.rays.shadow as f64;
     println!("{differing} pixels differ, {rays:.3} of the shadow rays");
-    assert!(differing * 100 <= reference.pixels.len(), "{differing} pixels differ");
+    assert!(differing * 100 <= reference.pixels().len(), "{differing} pixels differ");
     assert!(rays <= share, "{rays} of the conventional shadow rays");
 }
 
@@ -57,17 +58,17 @@ fn occluders_thinner_than_the_spacing_keep_their_shadows() {
     let lights = vec![light(Vec3::new(0.3, 3.0, -2.0), Vec3::ONE)];
     let scene = builder.scene(vec![grey(0.8)], lights, Falloff::default());
     let camera = camera(Vec3::new(0.0, 3.0, 3.0), Vec3::ZERO, 45.0);
-    let mut settings = Settings { resolution: (320, 320), ..Settings::default() };
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.5));
-    settings.light_mesh.points.neighbourhood = Neighbourhood::Sphere;
-    settings.light_mesh.points.leaks = Leaks::Allow;
-    settings.light_mesh.resolve = Resolve::Trace;
+    let mut settings = settings_at((320, 320));
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.5));
+    settings.shading.kernel.neighbourhood = Neighbourhood::Sphere;
+    settings.shading.kernel.leaks = Leaks::Allow;
+    settings.shading.resolve = Resolve::Trace;
     let (reference, conventional) = conventional(&scene, &camera, &settings);
     let (traced, hybrid) = picture(&scene, &camera, &settings);
-    let dark = |film: &Film| film.pixels.iter().filter(|p| p[0] == 0.0).count();
+    let dark = |image: &Image| image.pixels().iter().filter(|p| p[0] == 0.0).count();
     let (sky_and_shadow, found) = (dark(&reference), dark(&traced));
     let mut lit = settings.clone();
-    lit.light_mesh.resolve = Resolve::Average;
+    lit.shading.resolve = Resolve::Average;
     let sky = dark(&picture(&scene, &camera, &lit).0);
     let (shadow, missed) = (sky_and_shadow - sky, sky_and_shadow - found);
     assert!(shadow > 500, "{shadow} pixels of shadow to find");

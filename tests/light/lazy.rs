@@ -4,14 +4,16 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use glam::Vec3;
+use lightmesh::World;
 use lightmesh::accel::{Accel, BvhAccel, Coherence, LaneMask, RayHitPacket, RayPacket};
-use lightmesh::light_mesh::{DirectMesh, IndirectMesh, MeshPoints, NeededPoints, Neighbours, PointMask};
-use lightmesh::render::{LightMeshes, render_light_mesh};
+use lightmesh::light_mesh::direct::DirectMesh;
+use lightmesh::light_mesh::indirect::{DirectTransport, IndirectMesh};
+use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::scene::{Camera, Hit, Ray, SurfacePoint};
 use lightmesh::settings::{IndirectSettings, Leaks, Settings, Spacing};
 
-use crate::common::{backend, bits, camera, forest, surface_point};
+use crate::common::{bits, camera, forest, session, settings_at, surface_point};
 
 /// Ray queries that keep account of all occlusion rays: how often each was asked.
 struct Witness {
@@ -79,10 +81,10 @@ impl Accel for Witness {
 const LIGHTS: u64 = 5;
 
 fn settings() -> Settings {
-    let mut settings = Settings { resolution: (70, 70), ..Settings::default() };
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.7));
+    let mut settings = settings_at((70, 70));
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.7));
     // Nothing but mesh points asks for occlusion then.
-    settings.light_mesh.points.leaks = Leaks::Allow;
+    settings.shading.kernel.leaks = Leaks::Allow;
     settings
 }
 
@@ -90,24 +92,13 @@ fn with_indirect() -> Settings {
     let mut settings = settings();
     let mut indirect = IndirectSettings { directions: 16, bounces: 2, ..IndirectSettings::default() };
     indirect.points.spacing = Spacing::Units(Vec3::splat(2.5));
-    indirect.points.leaks = Leaks::Allow;
-    settings.light_mesh.indirect = Some(indirect);
+    settings.mesh.indirect = Some(indirect);
+    settings.shading.indirect.kernel.leaks = Leaks::Allow;
     settings
 }
 
 fn second_camera() -> Camera {
     camera(Vec3::new(-6.0, 5.0, 9.0), Vec3::new(0.0, 2.0, 0.0), 50.0)
-}
-
-/// The mesh points in the neighbourhoods of surface points.
-fn needed(mesh: &MeshPoints, surfaces: &[SurfacePoint]) -> PointMask {
-    let mut needed = NeededPoints::default();
-    let mut neighbours = Neighbours::default();
-    for surface in surfaces {
-        mesh.neighbours(surface, &mut neighbours);
-        neighbours.ids().iter().for_each(|&id| needed.insert(id));
-    }
-    PointMask::union(needed.into_bricks())
 }
 
 /// Surface points on the ground along x, every fifth of a unit.
@@ -120,18 +111,29 @@ fn on_the_ground(from: i32, to: i32) -> Vec<SurfacePoint> {
 #[test]
 fn no_occlusion_ray_is_traced_twice() {
     let loaded = forest(1_500, LIGHTS as u32);
-    let settings = with_indirect().light_mesh;
+    let settings = with_indirect();
     let witness = Witness::new(&loaded);
-    let mut direct = DirectMesh::new(&loaded.scene, &settings).unwrap();
-    let mut indirect = IndirectMesh::new(&loaded.scene, &settings.indirect.unwrap()).unwrap();
-    let mut rays = 0;
+    let scene = &loaded.scene;
+    let (lights, emissive) = (PackedLights::of_scene(scene), EmissiveTriangles::of_scene(scene));
+    let world = World { accel: &witness, scene, lights: &lights, emissive: &emissive };
+    let mut direct = DirectMesh::new(scene.bounds());
+    let Settings { mesh, shading, .. } = &settings;
+    let reading = direct.shading(&mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let mut indirect = IndirectMesh::new(scene.bounds(), mesh.indirect.as_ref().unwrap());
+    let reading_indirect = indirect.shading(&shading.indirect).unwrap();
+    let (mut rays, mut evaluated) = (0, 0);
     for (from, to) in [(-20, 5), (-5, 20), (-20, 20)] {
         let surfaces = on_the_ground(from, to);
-        rays += direct.evaluate(&witness, &loaded.scene, &needed(&direct.points, &surfaces));
-        let of_indirect = needed(&indirect.points, &surfaces);
-        rays += indirect.evaluate(&witness, &loaded.scene, &mut direct, 1.0, of_indirect).shadow;
+        let needed = direct.view(&lights, &reading).lookup.needed_anywhere(surfaces.iter());
+        let counted = direct.evaluate(world, &reading, &needed);
+        let needed = indirect.view(&reading_indirect).lookup.needed_anywhere(surfaces.iter());
+        let transport = DirectTransport { shading: &reading, scale: 1.0 };
+        let of_indirect = indirect.evaluate(world, &mut direct, transport, &reading_indirect, needed);
+        assert_eq!((of_indirect.shadow, counted.inside), (0, 0));
+        rays += counted.shadow + of_indirect.direct.shadow;
+        evaluated += counted.evaluated + of_indirect.direct.evaluated;
     }
-    assert_eq!(rays, direct.points.counters.evaluated * LIGHTS);
+    assert_eq!(rays, evaluated * LIGHTS);
     assert_eq!(witness.account(), (rays, 1));
 }
 
@@ -139,12 +141,10 @@ fn no_occlusion_ray_is_traced_twice() {
 #[test]
 fn no_mesh_point_is_evaluated_twice() {
     let loaded = forest(1_500, LIGHTS as u32);
-    let backend = backend(&loaded.scene);
-    for settings in [settings(), with_indirect()] {
-        let settings = Settings { block_pixels: Some(1_500), ..settings };
-        let mut meshes = LightMeshes::new(&loaded.scene, &settings).unwrap();
-        let mut render =
-            |camera: &Camera| render_light_mesh(&backend, &loaded.scene, camera, &settings, &mut meshes, &());
+    for mut settings in [settings(), with_indirect()] {
+        settings.view.block_samples = Some(1_500);
+        let mut session = session(&loaded.scene);
+        let mut render = |camera: &Camera| session.render(camera, &settings).unwrap();
         let (first, stats) = render(&loaded.cameras[0]);
         let evaluated = stats.mesh_points.direct.evaluated;
         assert_eq!(stats.rays.shadow, evaluated * LIGHTS);
@@ -154,14 +154,13 @@ fn no_mesh_point_is_evaluated_twice() {
         let (again, stats) = render(&loaded.cameras[0]);
         assert_eq!(stats.rays.shadow, 0);
         assert_eq!(stats.rays.indirect, 0);
-        assert_eq!(stats.mesh_points.direct.evaluated, evaluated);
+        assert_eq!(stats.mesh_points.direct.evaluated, 0);
         assert!(bits(&again) == bits(&first));
 
         // Another view evaluates what is new in it alone.
         let (_, stats) = render(&second_camera());
-        let both = stats.mesh_points.direct.evaluated;
-        assert_eq!(stats.rays.shadow, (both - evaluated) * LIGHTS);
-        assert!(both > evaluated);
+        assert_eq!(stats.rays.shadow, stats.mesh_points.direct.evaluated * LIGHTS);
+        assert!(stats.mesh_points.direct.evaluated > 0);
     }
 }
 
@@ -170,20 +169,20 @@ fn no_mesh_point_is_evaluated_twice() {
 #[test]
 fn a_view_does_not_depend_on_the_views_before_it() {
     let loaded = forest(1_500, LIGHTS as u32);
-    let backend = backend(&loaded.scene);
     let mut one_bounce = with_indirect();
-    one_bounce.light_mesh.indirect.as_mut().unwrap().bounces = 1;
+    one_bounce.mesh.indirect.as_mut().unwrap().bounces = 1;
     for settings in [settings(), one_bounce] {
         let render = |cameras: [&Camera; 2]| {
-            let mut meshes = LightMeshes::new(&loaded.scene, &settings).unwrap();
-            cameras
-                .map(|camera| render_light_mesh(&backend, &loaded.scene, camera, &settings, &mut meshes, &()))
+            let mut session = session(&loaded.scene);
+            cameras.map(|camera| session.render(camera, &settings).unwrap())
         };
         let (first, second) = (&loaded.cameras[0], &second_camera());
         let [(one, _), (two, stats)] = render([first, second]);
-        let [(two_before, _), (one_after, other_order)] = render([second, first]);
+        let [(two_before, other_order), (one_after, last)] = render([second, first]);
         assert!(bits(&one) == bits(&one_after) && bits(&two) == bits(&two_before));
-        assert_eq!(stats.mesh_points.direct.evaluated, other_order.mesh_points.direct.evaluated);
+        // Both orders come to the same points in all.
+        let [counted, both] = [stats, other_order].map(|stats| stats.mesh_points.direct.evaluated);
+        assert!(counted < both && last.mesh_points.direct.evaluated > 0);
     }
 }
 
@@ -192,12 +191,8 @@ fn a_view_does_not_depend_on_the_views_before_it() {
 fn unneeded_points_are_never_evaluated() {
     let loaded = forest(1_500, LIGHTS as u32);
     let settings = settings();
-    let backend = backend(&loaded.scene);
-    let mut meshes = LightMeshes::new(&loaded.scene, &settings).unwrap();
-    let mut counters = |camera: &Camera| {
-        let (_, stats) = render_light_mesh(&backend, &loaded.scene, camera, &settings, &mut meshes, &());
-        stats.mesh_points.direct
-    };
+    let mut session = session(&loaded.scene);
+    let mut counters = |camera: &Camera| session.render(camera, &settings).unwrap().1.mesh_points.direct;
     let sky = camera(Vec3::new(0.0, 30.0, 0.0), Vec3::new(0.1, 60.0, 0.0), 40.0);
     assert_eq!(counters(&sky).evaluated, 0);
     let counters = counters(&loaded.cameras[0]);

@@ -2,9 +2,7 @@
 
 use glam::Vec3;
 use lightmesh::scene::{Camera, Falloff, Scene};
-use lightmesh::settings::{
-    Estimator, IndirectForm, IndirectSettings, Leaks, PointSettings, Settings, Spacing,
-};
+use lightmesh::settings::{Estimator, IndirectForm, IndirectSettings, Leaks, Settings, Spacing};
 
 use crate::common::{Builder, camera, grey, light, mean, picture};
 
@@ -28,22 +26,21 @@ fn rooms() -> (Scene, [Camera; 2]) {
 /// Mean of the dark room over that of the bright one.
 fn leaked(settings: &Settings) -> f64 {
     let (scene, [bright, dark]) = rooms();
-    let settings = Settings { resolution: (64, 48), ..settings.clone() };
+    let mut settings = settings.clone();
+    settings.view.resolution = (64, 48);
     let [bright, dark] = [bright, dark].map(|camera| mean(&picture(&scene, &camera, &settings).0));
     assert!(bright > 0.05, "the bright room is dark: {bright}");
     dark / bright
 }
 
-fn with_spacing(points: PointSettings) -> PointSettings {
-    PointSettings { spacing: Spacing::Units(Vec3::splat(SPACING)), ..points }
-}
+const SPACED: Spacing = Spacing::Units(Vec3::splat(SPACING));
 
 #[test]
 fn a_thin_wall_keeps_a_dark_room_dark_with_the_default_settings() {
     for estimator in [Estimator::PerLight, Estimator::Ratio, Estimator::Directional] {
         let mut settings = Settings::default();
-        settings.light_mesh.points = with_spacing(settings.light_mesh.points);
-        settings.light_mesh.estimator = estimator;
+        settings.mesh.direct.spacing = SPACED;
+        settings.shading.estimator = estimator;
         let share = leaked(&settings);
         assert!(share < 0.01, "{estimator:?}: {share}");
     }
@@ -54,10 +51,11 @@ fn a_thin_wall_keeps_indirect_light_out() {
     for form in [IndirectForm::Scalar, IndirectForm::Directional] {
         for bounces in [1, 4] {
             let mut settings = Settings::default();
-            settings.light_mesh.points = with_spacing(settings.light_mesh.points);
-            let indirect = IndirectSettings { form, bounces, directions: 64, ..IndirectSettings::default() };
-            settings.light_mesh.indirect =
-                Some(IndirectSettings { points: with_spacing(indirect.points.clone()), ..indirect });
+            settings.mesh.direct.spacing = SPACED;
+            let mut indirect =
+                IndirectSettings { form, bounces, directions: 64, ..IndirectSettings::default() };
+            indirect.points.spacing = SPACED;
+            settings.mesh.indirect = Some(indirect);
             let share = leaked(&settings);
             assert!(share < 0.01, "{form:?}, {bounces} bounces: {share}");
         }
@@ -68,8 +66,8 @@ fn a_thin_wall_keeps_indirect_light_out() {
 #[test]
 fn without_the_guard_the_wall_leaks() {
     let mut settings = Settings::default();
-    settings.light_mesh.points = with_spacing(settings.light_mesh.points);
-    settings.light_mesh.points.leaks = Leaks::Allow;
+    settings.mesh.direct.spacing = SPACED;
+    settings.shading.kernel.leaks = Leaks::Allow;
     let share = leaked(&settings);
     assert!(share > 0.01, "{share}");
 }

@@ -2,9 +2,7 @@
 
 use glam::{Quat, Vec3};
 use lightmesh::scene::Falloff;
-use lightmesh::settings::{
-    Estimator, Leaks, LightMeshSettings, Neighbourhood, PointSettings, Radius, Spacing,
-};
+use lightmesh::settings::{Estimator, KernelSettings, Leaks, Neighbourhood, Radius, Settings, Spacing};
 
 use crate::common::{Builder, direct_illumination, grey, light, surface_point};
 
@@ -23,17 +21,14 @@ fn profile(a: f32, ts: &[f32]) -> Vec<f32> {
     builder.quad(at(-40.0, a * HEIGHT, -20.0), turn * (Vec3::Z * 40.0), turn * (Vec3::X * 40.0), 0);
     builder.stretch_bounds(Vec3::splat(-3.0), Vec3::splat(3.0));
     let scene = builder.scene(vec![grey(1.0)], vec![light(at(0.0, HEIGHT, 0.0), Vec3::ONE)], Falloff::None);
-    let settings = LightMeshSettings {
-        points: PointSettings {
-            spacing: Spacing::Units(Vec3::splat(RADIUS / 16.0)),
-            radius: Radius::Units(RADIUS),
-            neighbourhood: Neighbourhood::Sphere,
-            hemisphere: false,
-            leaks: Leaks::Allow,
-            ..PointSettings::default()
-        },
-        estimator: Estimator::PerLight,
-        ..LightMeshSettings::default()
+    let mut settings = Settings::default();
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(RADIUS / 16.0));
+    settings.shading.estimator = Estimator::PerLight;
+    settings.shading.kernel = KernelSettings {
+        radius: Radius::Units(RADIUS),
+        neighbourhood: Neighbourhood::Sphere,
+        hemisphere: false,
+        leaks: Leaks::Allow,
     };
     // No geometry at the receiver: it would cut the ball in half.
     let surfaces: Vec<_> =

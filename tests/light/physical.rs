@@ -64,16 +64,14 @@ fn pair(name: &str, reference: &str, light_mesh: &str, change: impl Fn(&mut Sett
     let text = scene_text(&folder, name, light_mesh);
     let mut loaded = load_scene_text(&text, &folder.join(format!("{name}.toml"))).unwrap();
     change(&mut loaded.settings);
-    let (film, _) = picture(&loaded.scene, &loaded.cameras[0], &loaded.settings);
-    let (width, height) = film.resolution;
-    let ours = Image::from_pixels(width, height, film.pixels).unwrap();
+    let (ours, _) = picture(&loaded.scene, &loaded.cameras[0], &loaded.settings);
     let theirs = image::read(&folder.join(format!("{reference}.exr"))).unwrap();
     Some(Pair { loaded, ours, theirs })
 }
 
 /// One bounce instead of as many as it takes.
 fn one_bounce(settings: &mut Settings) {
-    settings.light_mesh.indirect.as_mut().unwrap().bounces = 1;
+    settings.mesh.indirect.as_mut().unwrap().bounces = 1;
 }
 
 impl Pair {
@@ -105,7 +103,7 @@ impl Pair {
 
 #[test]
 fn direct_light_of_the_cornell_box_is_the_path_tracers() {
-    let no_indirect = |settings: &mut Settings| settings.light_mesh.indirect = None;
+    let no_indirect = |settings: &mut Settings| settings.mesh.indirect = None;
     let Some(pair) = pair("cornell", "cornell-direct", "", no_indirect) else { return };
     pair.assert_alike("cornell-direct");
 }

@@ -7,9 +7,10 @@ use std::path::Path;
 
 use glam::Vec3;
 use lightmesh::accel::{Accel, Backend};
+use lightmesh::image::Image;
 use lightmesh::image::tone::auto_exposure;
-use lightmesh::light_mesh::{DirectMesh, Neighbours};
-use lightmesh::render::Film;
+use lightmesh::light_mesh::direct::DirectMesh;
+use lightmesh::light_mesh::points::Neighbours;
 use lightmesh::scene::load::{LoadedScene, open_scene};
 use lightmesh::scene::{CameraRays, Interaction, PointLight, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
@@ -27,10 +28,10 @@ fn opened(model: &str) -> Option<LoadedScene> {
         return None;
     }
     let mut loaded = open_scene(&file).unwrap().loaded;
-    loaded.settings.resolution = RESOLUTION;
-    loaded.settings.light_mesh.resolve = Resolve::Average;
+    loaded.settings.view.resolution = RESOLUTION;
+    loaded.settings.shading.resolve = Resolve::Average;
     // Reflections would bring in surfaces that the test doesn't look at.
-    loaded.settings.max_depth = 1;
+    loaded.settings.view.max_depth = 1;
     Some(loaded)
 }
 
@@ -66,26 +67,26 @@ fn errs_only_where_the_spacing_explains_it(model: &str, lights: usize, coarsest:
     assert_eq!(scene.lights.len(), lights);
     let backend = backend(scene);
     let (exact, _) = conventional(scene, &cameras[0], settings);
-    let Spacing::Units(chosen) = settings.light_mesh.points.spacing else { panic!("a spacing is chosen") };
+    let Spacing::Units(chosen) = settings.mesh.direct.spacing else { panic!("a spacing is chosen") };
     let spacing = chosen * coarsest;
     let errors = [1.0f32, 0.5, 0.25].map(|part| {
         let mut settings = settings.clone();
-        settings.light_mesh.points.spacing = Spacing::Units(spacing * part);
-        let (film, _) = picture(scene, &cameras[0], &settings);
-        check_bounds(&backend, &loaded, &settings, &film.pixels, &exact.pixels);
-        mean_error(&film, &exact)
+        settings.mesh.direct.spacing = Spacing::Units(spacing * part);
+        let (image, _) = picture(scene, &cameras[0], &settings);
+        check_bounds(&backend, &loaded, &settings, image.pixels(), exact.pixels());
+        mean_error(&image, &exact)
     });
     println!("{model}: mean error / mean {errors:?} at spacings of {}, 1/2 and 1/4 of it", spacing.x);
     assert!(errors.windows(2).all(|pair| pair[1] <= 0.85 * pair[0]), "{errors:?}");
 }
 
 /// Mean difference over the mean, of values up to the white of a tone-mapped picture.
-fn mean_error(film: &Film, exact: &Film) -> f64 {
-    let white = auto_exposure(&exact.pixels).exp2().recip();
-    let values = |film: &Film| -> Vec<f64> {
-        film.pixels.iter().flatten().map(|&value| f64::from(value.min(white))).collect()
+fn mean_error(image: &Image, exact: &Image) -> f64 {
+    let white = auto_exposure(exact.pixels()).exp2().recip();
+    let values = |image: &Image| -> Vec<f64> {
+        image.pixels().iter().flatten().map(|&value| f64::from(value.min(white))).collect()
     };
-    let (values, expected) = (values(film), values(exact));
+    let (values, expected) = (values(image), values(exact));
     let difference: f64 = values.iter().zip(&expected).map(|(a, b)| (a - b).abs()).sum();
     difference / expected.iter().sum::<f64>()
 }
@@ -94,11 +95,14 @@ fn check_bounds(
     backend: &Backend,
     loaded: &LoadedScene,
     settings: &Settings,
-    film: &[[f32; 3]],
+    image: &[[f32; 3]],
     exact: &[[f32; 3]],
 ) {
     let scene = &loaded.scene;
-    let mesh = DirectMesh::new(scene, &settings.light_mesh).unwrap();
+    let mut mesh = DirectMesh::new(scene.bounds());
+    let shading = &settings.shading;
+    let shading = mesh.shading(&settings.mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let points = &mesh.store().points;
     let mut neighbours = Neighbours::default();
     let (mut checked, mut agreeing) = (0, 0);
     let surfaces = visible(backend, loaded);
@@ -106,18 +110,18 @@ fn check_bounds(
     for (pixel, seen) in surfaces.iter().enumerate().step_by(7) {
         let Some(seen) = seen else { continue };
         let y = &seen.point;
-        mesh.points.neighbours(y, &mut neighbours);
+        shading.neighbourhoods.find(points, y, &mut neighbours);
         let sees = |from: Vec3, light: &PointLight| !backend.occluded(&Ray::between(from, light.position));
         let disagrees = |light: &&PointLight| {
             let truth = sees(y.ray_origin(), light);
-            neighbours.ids().iter().any(|&id| sees(mesh.points.position(id), light) != truth)
+            neighbours.ids().iter().any(|&id| sees(points.position(id), light) != truth)
         };
         let facing = scene.lights.iter().filter(|light| share(scene, light, seen) != Vec3::ZERO);
         let bound: Vec3 = facing.filter(disagrees).map(|light| share(scene, light, seen)).sum();
         checked += 1;
         agreeing += usize::from(bound == Vec3::ZERO);
         for channel in 0..3 {
-            let (value, expected) = (film[pixel][channel], exact[pixel][channel]);
+            let (value, expected) = (image[pixel][channel], exact[pixel][channel]);
             // The sums over up to hundreds of lights run in different orders.
             let rounding = 1e-4 * expected.max(value) + 1e-7;
             assert!(

@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
-use lightmesh::render::{Film, render};
+use lightmesh::image::Image;
+use lightmesh::render::render;
 use lightmesh::scene::{
     Camera, Falloff, Instance, Material, PointLight, Positions, Scene, TriangleMaterials, TriangleMesh,
 };
-use lightmesh::settings::{
-    Integrator, Leaks, LightMeshSettings, Neighbourhood, PointSettings, Radius, Settings, Spacing,
-};
+use lightmesh::settings::{Integrator, KernelSettings, Leaks, Neighbourhood, Radius, Settings, Spacing};
 
 const LIGHT: Vec3 = Vec3::new(0.0, 10.0, 0.0);
 const EYE: Vec3 = Vec3::new(0.0, 4.0, 0.0);
@@ -58,28 +57,24 @@ fn camera() -> Camera {
 }
 
 fn settings(integrator: Integrator, neighbourhood: Neighbourhood, spacing: f32) -> Settings {
-    Settings {
-        resolution: (SIDE, SIDE),
-        integrator,
-        reference_samples: 1024,
-        light_mesh: LightMeshSettings {
-            points: PointSettings {
-                spacing: Spacing::Units(Vec3::splat(spacing)),
-                radius: Radius::Units(RADIUS),
-                neighbourhood,
-                leaks: Leaks::Allow,
-                ..PointSettings::default()
-            },
-            ..LightMeshSettings::default()
-        },
-        ..Settings::default()
-    }
+    let mut settings = Settings::default();
+    settings.view.resolution = (SIDE, SIDE);
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+    settings.shading.integrator = integrator;
+    settings.shading.reference_samples = 1024;
+    settings.shading.kernel = KernelSettings {
+        radius: Radius::Units(RADIUS),
+        neighbourhood,
+        leaks: Leaks::Allow,
+        ..KernelSettings::default()
+    };
+    settings
 }
 
-fn picture(settings: &Settings) -> Film {
+fn picture(settings: &Settings) -> Image {
     let scene = half_plane();
     let backend = Backend::build(BackendChoice::BruteForce, &scene).expect("a small scene").backend;
-    render(&backend, &scene, &camera(), settings, &()).expect("a modest mesh").0
+    render(&backend, &scene, &camera(), settings).expect("a modest mesh").0
 }
 
 /// Ground point of a pixel's centre: the view's right is −x, its down −z.
@@ -93,9 +88,9 @@ fn ground(column: usize, row: usize) -> Vec3 {
 /// edge is that of the whole ball: (2 + 3t − t³)/4 with t = s/R (spec §13), whatever the height of the occluder.
 #[test]
 fn the_penumbra_of_an_edge_has_its_analytic_profile() {
-    let film = picture(&settings(Integrator::Reference, Neighbourhood::Sphere, 0.5));
+    let image = picture(&settings(Integrator::Reference, Neighbourhood::Sphere, 0.5));
     let mut penumbra = 0;
-    for (index, pixel) in film.pixels.iter().enumerate() {
+    for (index, pixel) in image.pixels().iter().enumerate() {
         let y = ground(index % SIDE as usize, index / SIDE as usize);
         let t = (y.x / RADIUS).clamp(-1.0, 1.0);
         penumbra += u32::from(t.abs() < 1.0);
@@ -117,9 +112,9 @@ fn the_penumbra_of_an_edge_has_its_analytic_profile() {
 fn light_meshes_converge_to_the_reference() {
     let reference = picture(&settings(Integrator::Reference, Neighbourhood::SmoothSphere, 0.5));
     let errors = [0.6, 0.3, 0.15].map(|spacing| {
-        let film = picture(&settings(Integrator::LightMesh, Neighbourhood::SmoothSphere, spacing));
-        let squares = film.pixels.iter().zip(&reference.pixels).map(|(a, b)| (a[0] - b[0]).powi(2));
-        (squares.sum::<f32>() / film.pixels.len() as f32).sqrt()
+        let image = picture(&settings(Integrator::LightMesh, Neighbourhood::SmoothSphere, spacing));
+        let squares = image.pixels().iter().zip(reference.pixels()).map(|(a, b)| (a[0] - b[0]).powi(2));
+        (squares.sum::<f32>() / image.pixels().len() as f32).sqrt()
     });
     assert!(errors[0] > errors[1] && errors[1] > errors[2], "{errors:?}");
     assert!(errors[2] < 0.5 * errors[0], "{errors:?}");

@@ -1,12 +1,14 @@
 //! The short cut for surface points in a row of the same normal gives what the plain way of shading gives.
 
 use glam::Vec3;
+use lightmesh::World;
 use lightmesh::accel::BvhAccel;
-use lightmesh::light_mesh::{DirectMesh, PointMask, Scratch};
+use lightmesh::light_mesh::direct::DirectMesh;
+use lightmesh::light_mesh::lookup::LookupScratch;
 use lightmesh::scene::SurfacePoint;
-use lightmesh::settings::{Estimator, Leaks, LightMeshSettings, Neighbourhood, Spacing};
+use lightmesh::settings::{Estimator, KernelSettings, Leaks, Neighbourhood, PointSettings, Spacing};
 
-use crate::common::{forest, surface_point};
+use crate::common::{forest, surface_point, with_world};
 
 /// Rows of surface points: on the ground, and across the crowns at any slope.
 fn rows() -> Vec<SurfacePoint> {
@@ -24,24 +26,28 @@ fn rows() -> Vec<SurfacePoint> {
 #[test]
 fn surface_points_in_a_row_are_shaded_as_if_alone() {
     let loaded = forest(5_000, 40);
-    let accel = BvhAccel::build(&loaded.scene).unwrap();
     let surfaces = rows();
+    with_world(&loaded.scene, |world| compare_rows(world, &surfaces));
+}
+
+fn compare_rows(world: World<BvhAccel>, surfaces: &[SurfacePoint]) {
     for estimator in [Estimator::Directional, Estimator::PerLight] {
         for leaks in [Leaks::Allow, Leaks::Invalidate, Leaks::Visibility] {
             for neighbourhood in [Neighbourhood::SmoothSphere, Neighbourhood::Sphere, Neighbourhood::Nearest]
             {
-                let mut settings = LightMeshSettings { estimator, ..LightMeshSettings::default() };
-                settings.points.spacing = Spacing::Units(Vec3::splat(0.4));
-                settings.points.leaks = leaks;
-                settings.points.neighbourhood = neighbourhood;
-                let mut mesh = DirectMesh::new(&loaded.scene, &settings).unwrap();
-                let needed = PointMask::union(mesh.points.needed(surfaces.iter()));
-                mesh.evaluate(&accel, &loaded.scene, &needed);
-                let (mut alone, mut tile) = (Scratch::default(), Scratch::for_tile());
+                let spacing = Spacing::Units(Vec3::splat(0.4));
+                let points = PointSettings { spacing, ..PointSettings::default() };
+                let kernel = KernelSettings { leaks, neighbourhood, ..KernelSettings::default() };
+                let mut mesh = DirectMesh::new(world.scene.bounds());
+                let shading = mesh.shading(&points, &kernel, estimator).unwrap();
+                let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
+                mesh.evaluate(world, &shading, &needed);
+                let view = mesh.view(world.lights, &shading);
+                let (mut alone, mut tile) = (LookupScratch::default(), LookupScratch::for_tile());
                 let mut lit = 0;
-                for surface in &surfaces {
-                    let expected = mesh.illumination(&accel, surface, &mut alone);
-                    let found = mesh.illumination_in_row(&accel, surface, &mut tile);
+                for surface in surfaces {
+                    let expected = view.illumination(world.accel, surface, &mut alone);
+                    let found = view.illumination_in_row(world.accel, surface, &mut tile);
                     // Light from all sides cancels where a normal turns away from it: what rounding is measured by.
                     let scale = expected.max_element().max(0.1);
                     assert!(

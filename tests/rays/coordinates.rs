@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
-use lightmesh::render::{Film, render};
+use lightmesh::image::Image;
+use lightmesh::render::render;
 use lightmesh::scene::{Camera, Falloff, Scene};
-use lightmesh::settings::{Integrator, Resolve, Settings, Spacing};
+use lightmesh::settings::{Integrator, Resolve, Spacing};
 
-use crate::common::{Builder, camera, grey, light};
+use crate::common::{Builder, camera, grey, light, settings_at};
 
 const RESOLUTION: (u32, u32) = (96, 72);
 
@@ -43,16 +44,16 @@ fn backends(scene: &Scene) -> Vec<Backend> {
 /// The largest relative difference at pixels around which, `margin` pixels wide, the reference has no edge: no value that
 /// is off by more than a quarter from the middle's, within some rows. There is one light, so that shadows are black: among those pixels are
 /// black ones, where any light counts as a difference of 1. Also how many such pixels there are, lit and black.
-fn largest_difference(film: &Film, reference: &Film, margin: u32, rows: Range<u32>) -> (f32, [usize; 2]) {
-    let (width, _) = reference.resolution;
-    let at = |film: &Film, x: u32, y: u32| film.pixels[(y * width + x) as usize][0];
+fn largest_difference(image: &Image, reference: &Image, margin: u32, rows: Range<u32>) -> (f32, [usize; 2]) {
+    let width = reference.width();
+    let at = |image: &Image, x: u32, y: u32| image.pixels()[(y * width + x) as usize][0];
     let (mut largest, mut count) = (0.0f32, [0; 2]);
     for (x, y) in rows.flat_map(|y| (margin..width - margin).map(move |x| (x, y))) {
         let middle = at(reference, x, y);
         let mut around =
             (y - margin..=y + margin).flat_map(|y| (x - margin..=x + margin).map(move |x| (x, y)));
         if around.all(|(x, y)| (at(reference, x, y) - middle).abs() <= 0.25 * middle) {
-            let value = at(film, x, y);
+            let value = at(image, x, y);
             largest = largest.max((value - middle).abs() / value.max(middle).max(f32::MIN_POSITIVE));
             count[usize::from(middle == 0.0)] += 1;
         }
@@ -66,19 +67,19 @@ fn largest_difference(film: &Film, reference: &Film, margin: u32, rows: Range<u3
 /// Acne would show as dark pixels in the lit ones, gaps as light in the shadows.
 #[test]
 fn a_scene_far_from_the_origin_looks_as_it_does_there() {
-    let mut settings = Settings { resolution: RESOLUTION, ..Settings::default() };
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(2.0));
-    settings.light_mesh.resolve = Resolve::Trace;
+    let mut settings = settings_at(RESOLUTION);
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(2.0));
+    settings.shading.resolve = Resolve::Trace;
     for integrator in [Integrator::Conventional, Integrator::LightMesh] {
-        settings.integrator = integrator;
+        settings.shading.integrator = integrator;
         let (scene, camera) = yard(Vec3::ZERO, 64.0);
         for (number, backend) in backends(&scene).iter().enumerate() {
-            let reference = render(backend, &scene, &camera, &settings, &()).unwrap().0;
+            let reference = render(backend, &scene, &camera, &settings).unwrap().0;
             for distance in [1e4f32, 1e5] {
                 // Whole multiples of the spacing: the mesh points move along.
                 let (scene, camera) = yard(Vec3::new(distance, 0.5 * distance, -distance), 64.0);
                 let backend = &backends(&scene)[number];
-                let far = render(backend, &scene, &camera, &settings, &()).unwrap().0;
+                let far = render(backend, &scene, &camera, &settings).unwrap().0;
                 let (difference, count) = largest_difference(&far, &reference, 2, 2..RESOLUTION.1 - 2);
                 assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
                 let allowed = 2.0 * 32.0 * f32::EPSILON * distance / 25.0 + 1e-3;
@@ -97,15 +98,15 @@ fn a_scene_far_from_the_origin_looks_as_it_does_there() {
 /// on edges; the upper third, in which the small floor ends, is left out.
 #[test]
 fn details_of_a_huge_scene_look_as_in_a_small_one() {
-    let settings =
-        Settings { resolution: RESOLUTION, integrator: Integrator::Conventional, ..Settings::default() };
+    let mut settings = settings_at(RESOLUTION);
+    settings.shading.integrator = Integrator::Conventional;
     let (small, camera) = yard(Vec3::ZERO, 256.0);
     let (huge, _) = yard(Vec3::ZERO, 4300.0);
     for (of_small, of_huge) in backends(&small).iter().zip(&backends(&huge)) {
-        let reference = render(of_small, &small, &camera, &settings, &()).unwrap().0;
-        let film = render(of_huge, &huge, &camera, &settings, &()).unwrap().0;
+        let reference = render(of_small, &small, &camera, &settings).unwrap().0;
+        let image = render(of_huge, &huge, &camera, &settings).unwrap().0;
         let (difference, count) =
-            largest_difference(&film, &reference, 1, RESOLUTION.1 / 3..RESOLUTION.1 - 1);
+            largest_difference(&image, &reference, 1, RESOLUTION.1 / 3..RESOLUTION.1 - 1);
         assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
         assert!(difference <= 1e-3, "{}: {difference}", of_huge.name());
     }

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
 use lightmesh::accel::{Backend, BackendChoice};
-use lightmesh::render::{Film, render};
+use lightmesh::image::Image;
+use lightmesh::render::render;
 use lightmesh::scene::{Falloff, Instance, Positions, Scene, TriangleMesh};
-use lightmesh::settings::{Integrator, Resolve, Settings, Spacing};
+use lightmesh::settings::{Integrator, Resolve, Spacing};
 
-use crate::common::{Builder, camera, grey, light};
+use crate::common::{Builder, camera, grey, light, settings_at};
 
 /// Placements that are exact in single precision: a turn, a mirror image, scales of both kinds, and all at once.
 fn placements() -> Vec<Affine3A> {
@@ -63,11 +64,11 @@ fn flattened(scene: &Scene) -> Scene {
 /// Where a ray passes an edge nearer than rounding, it may fall to either side. Rounding is about 1e-5 of the scene,
 /// a pixel is 1e-2 of it: that happens to one in a thousand of the pixels on edges, and those are not the half of all.
 /// Everywhere else, values differ by the rounding of positions and normals.
-fn assert_same(flat: &Film, instanced: &Film, what: &str) {
+fn assert_same(flat: &Image, instanced: &Image, what: &str) {
     let apart =
         |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * a[c].max(b[c]).max(0.1));
-    let differing = flat.pixels.iter().zip(&instanced.pixels).filter(|&pair| apart(pair)).count();
-    assert!(2000 * differing <= flat.pixels.len(), "{what}: {differing} of {} pixels", flat.pixels.len());
+    let differing = flat.pixels().iter().zip(instanced.pixels()).filter(|&pair| apart(pair)).count();
+    assert!(2000 * differing <= flat.pixels().len(), "{what}: {differing} of {} pixels", flat.pixels().len());
 }
 
 /// With every backend, an instanced scene and its flattened copy give the same picture: placed by a turn, mirrored, scaled,
@@ -78,9 +79,9 @@ fn instanced_and_flattened_give_the_same_picture_on_every_backend() {
     let scene = instanced();
     let flat = flattened(&scene);
     let camera = camera(Vec3::new(1.5, 5.0, 9.0), Vec3::new(0.0, 0.5, 0.0), 50.0);
-    let mut settings = Settings { resolution: (96, 72), ..Settings::default() };
-    settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(0.5));
-    settings.light_mesh.resolve = Resolve::Trace;
+    let mut settings = settings_at((96, 72));
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.5));
+    settings.shading.resolve = Resolve::Trace;
     for choice in [BackendChoice::Embree, BackendChoice::Bvh, BackendChoice::BruteForce] {
         let (of_instanced, of_flat) = match (Backend::build(choice, &scene), Backend::build(choice, &flat)) {
             (Ok(instanced), Ok(flat)) => (instanced.backend, flat.backend),
@@ -91,9 +92,8 @@ fn instanced_and_flattened_give_the_same_picture_on_every_backend() {
             }
         };
         for integrator in [Integrator::Conventional, Integrator::LightMesh] {
-            let settings = Settings { integrator, ..settings.clone() };
-            let of =
-                |backend: &Backend, scene: &Scene| render(backend, scene, &camera, &settings, &()).unwrap().0;
+            settings.shading.integrator = integrator;
+            let of = |backend: &Backend, scene: &Scene| render(backend, scene, &camera, &settings).unwrap().0;
             assert_same(
                 &of(&of_flat, &flat),
                 &of(&of_instanced, &scene),
