@@ -4,7 +4,7 @@ use super::metrics::{MetricsError, check_sizes};
 use super::{Image, is_finite};
 
 /// Colour of pixels that are not finite in one of the images: a green that the colour map does not contain.
-pub const NON_FINITE: [u8; 3] = [0, 255, 0];
+const NON_FINITE: [u8; 3] = [0, 255, 0];
 
 /// Paints the error of every pixel: the mean over the channels of |a − b|, over the mean of the reference.
 ///

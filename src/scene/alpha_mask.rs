@@ -27,7 +27,7 @@ impl AlphaMask {
     }
 
     /// Whether the material is opaque everywhere.
-    pub fn is_solid(&self) -> bool {
+    pub(super) fn is_solid(&self) -> bool {
         let transparent = self.map.as_ref().is_some_and(|map| map.texture.has_transparency());
         self.alpha >= self.cutoff && !transparent
     }

@@ -38,7 +38,7 @@ pub enum LightShape {
 impl LightShape {
     /// Slope and offset such that clamp(slope · c + offset, 0, 1)² is the share of E_i at the angle of cosine c from
     /// the axis, as KHR_lights_punctual recommends.
-    pub fn cone_terms(self) -> (f32, f32) {
+    pub(crate) fn cone_terms(self) -> (f32, f32) {
         match self {
             Self::Spot { inner_cosine, outer_cosine, .. } => {
                 // A cone without a soft rim still needs a finite slope.

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{AlphaMask, TextureMap};
 
-/// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (spec §7).
+/// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (docs/method.md §7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name from the file, for messages and overrides.

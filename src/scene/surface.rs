@@ -4,9 +4,9 @@ use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
 use super::{Hit, Scene, TextureMap};
 
-/// A visible surface point y (spec §1).
+/// A visible surface point y (docs/method.md §1).
 ///
-/// Both normals are unit length and face the side from which the point was seen (spec §7).
+/// Both normals are unit length and face the side from which the point was seen (docs/method.md §7).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// y in world space, on the triangle to within rounding.
@@ -37,7 +37,7 @@ pub struct Interaction {
     pub front: bool,
     /// Whether both sides of the material are alike.
     pub two_sided: bool,
-    /// Whether rays of sight pass through this side (a culled back face).
+    /// Whether camera and reflected rays pass through this side (a culled back face).
     pub culled: bool,
 }
 

@@ -45,12 +45,12 @@ impl Texture {
     }
 
     /// Whether some texel is not fully opaque.
-    pub fn has_transparency(&self) -> bool {
+    pub(super) fn has_transparency(&self) -> bool {
         self.texels.iter().any(|texel| texel[3] != u8::MAX)
     }
 
     /// The same image with the grey value (the red channel) of another one as coverage, resampled where sizes differ.
-    pub fn with_coverage(&self, coverage: &Self) -> Self {
+    pub(super) fn with_coverage(&self, coverage: &Self) -> Self {
         let scale = |at: u32, from: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(from)) as u32;
         let mut texels = self.texels.clone();
         for (row, line) in (0..self.height).zip(texels.chunks_mut(self.width as usize)) {
@@ -64,7 +64,7 @@ impl Texture {
     }
 
     /// Mean of the four channels over all texels, in [0, 1], as stored (not linearised).
-    pub fn mean(&self) -> [f32; 4] {
+    pub(super) fn mean(&self) -> [f32; 4] {
         let mut sums = [0u64; 4];
         for texel in &self.texels {
             sums.iter_mut().zip(texel).for_each(|(sum, &value)| *sum += u64::from(value));

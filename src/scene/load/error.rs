@@ -175,7 +175,7 @@ pub struct Warning {
     pub file: PathBuf,
     /// Line, from 1, where there is one.
     pub line: Option<usize>,
-    /// What was found, and what was done about it.
+    /// The problem, and how the reader got around it.
     pub message: String,
 }
 

@@ -20,9 +20,9 @@ pub struct Model {
     pub lights: Vec<PointLight>,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
-    /// What was left out, counted.
+    /// Elements of the file that were left out, counted.
     pub skipped: Skipped,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 

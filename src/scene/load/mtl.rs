@@ -15,7 +15,7 @@ pub struct MtlFile {
     pub materials: Vec<Material>,
     /// Images and coverage of each of the materials.
     pub maps: Vec<MtlMaps>,
-    /// What was found and done.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 

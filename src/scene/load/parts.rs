@@ -48,7 +48,7 @@ impl MaterialOverride {
 
 impl Model {
     /// Applies an override; whether anything matched its selector.
-    pub fn apply_override(&mut self, selector: &Selector, values: &MaterialOverride) -> bool {
+    pub(super) fn apply_override(&mut self, selector: &Selector, values: &MaterialOverride) -> bool {
         match selector {
             Selector::Material(name) => self.override_materials(|material| material.name == *name, values),
             Selector::All => self.override_materials(|_| true, values),

@@ -31,7 +31,7 @@ pub struct MaterialTable {
     index: HashMap<String, u32>,
     used: Vec<Material>,
     images: HashMap<PathBuf, Option<Arc<Texture>>>,
-    /// What was found and done.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 

@@ -52,7 +52,7 @@ pub struct Statements {
     pub lines: usize,
     /// Statements that are not rendered.
     pub skipped: Skipped,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
     short_faces_told: bool,
     unknown_told: bool,

@@ -16,7 +16,7 @@ pub struct Gathered {
     pub cameras: Vec<Camera>,
     /// Elements of the models that were left out.
     pub skipped: Skipped,
-    /// What was found and done.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 

@@ -43,7 +43,7 @@ pub struct LoadedScene {
     pub settings: Settings,
     /// Elements of the models that were left out.
     pub skipped: Skipped,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 
