@@ -13,7 +13,7 @@ use lightmesh::light_mesh::{
     Basis, DirectMesh, DirectValues, LANES, LightTable, MeshPoints, NeededPoints, Neighbours, PointMask,
     Scratch, directional,
 };
-use lightmesh::scene::random::SplitMix64;
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{
     Instance, LightShape, Material, PointLight, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
     TriangleMesh,

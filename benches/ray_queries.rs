@@ -78,7 +78,7 @@ fn forest(triangles: usize) -> Scene {
     }
 }
 
-/// Sixteen rays at a time, in the orders in which light meshes and cameras ask for them.
+/// Sixteen rays at a time, in the orders in which light meshes and cameras trace them.
 struct Workload {
     name: &'static str,
     rays: Vec<Ray>,
@@ -148,11 +148,11 @@ fn any_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: Coher
     blocked
 }
 
-fn nearest_single(accel: &impl Accel, rays: &[Ray]) -> u32 {
+fn closest_single(accel: &impl Accel, rays: &[Ray]) -> u32 {
     rays.iter().map(|ray| u32::from(accel.intersect(ray).is_some())).sum()
 }
 
-fn nearest_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: Coherence) -> u32 {
+fn closest_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: Coherence) -> u32 {
     let mut packet = RayHitPacket::<N>::empty();
     let mut hits = 0;
     for rays in rays.chunks_exact(N) {
@@ -164,7 +164,7 @@ fn nearest_packet<const N: usize>(accel: &impl Accel, rays: &[Ray], coherence: C
 }
 
 /// Seconds that this thread has run, which other load on the machine doesn't count towards; wall-clock
-/// time where the system doesn't tell.
+/// time where the system doesn't count it.
 fn seconds() -> f64 {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
@@ -181,14 +181,14 @@ fn run(accel: &impl Accel, kind: usize, work: &Workload) -> (f64, u32) {
         1 => any_packet::<4>(accel, rays, work.coherence),
         2 => any_packet::<8>(accel, rays, work.coherence),
         3 => any_packet::<16>(accel, rays, work.coherence),
-        4 => nearest_single(accel, rays),
-        5 => nearest_packet::<8>(accel, rays, work.coherence),
-        _ => nearest_packet::<16>(accel, rays, work.coherence),
+        4 => closest_single(accel, rays),
+        5 => closest_packet::<8>(accel, rays, work.coherence),
+        _ => closest_packet::<16>(accel, rays, work.coherence),
     };
     (seconds() - start, black_box(hits))
 }
 
-const KINDS: [&str; 7] = ["any 1", "any 4", "any 8", "any 16", "nearest 1", "nearest 8", "nearest 16"];
+const KINDS: [&str; 7] = ["any 1", "any 4", "any 8", "any 16", "closest 1", "closest 8", "closest 16"];
 
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);

@@ -5,6 +5,7 @@
 pub mod accel;
 #[cfg(feature = "cli")]
 mod bench;
+mod bounds;
 #[cfg(feature = "cli")]
 pub mod cli;
 mod color;
@@ -13,7 +14,13 @@ pub mod crosscheck;
 pub mod framing;
 pub mod image;
 pub mod light_mesh;
+pub mod lights;
 pub mod render;
+pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod simd;
+mod world;
+
+pub use bounds::Bounds;
+pub use world::World;

@@ -1,55 +1,26 @@
 //! The choice of a backend at run time.
 
 use std::fmt;
-use std::str::FromStr;
 
 use super::{Accel, BruteForceAccel, BvhAccel, BvhError, Coherence, LaneMask, RayHitPacket, RayPacket};
 #[cfg(feature = "embree")]
 use super::{EmbreeAccel, EmbreeError};
 use crate::scene::{Hit, Ray, Scene};
+use crate::settings::named_enum;
 
-/// What the user asks for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BackendChoice {
-    /// Embree where it is installed, the pure-Rust BVH elsewhere.
-    #[default]
-    Auto,
-    /// Embree; an error where there is none.
-    Embree,
-    /// The pure-Rust BVH.
-    Bvh,
-    /// A loop over all triangles, for tests.
-    BruteForce,
-}
-
-impl BackendChoice {
-    /// The name of each choice, the choice, and what it stands for.
-    pub const NAMES: [(&'static str, Self, &'static str); 4] = [
-        ("auto", Self::Auto, "Embree where it is installed, the pure-Rust BVH elsewhere"),
-        ("embree", Self::Embree, "Embree; an error where there is none"),
-        ("bvh", Self::Bvh, "The pure-Rust BVH"),
-        ("brute-force", Self::BruteForce, "A loop over all triangles, for tests"),
-    ];
-}
-
-impl fmt::Display for BackendChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::NAMES.iter().find(|(_, choice, _)| choice == self);
-        f.write_str(named.map_or("", |(name, ..)| name))
-    }
-}
-
-/// A text that names no backend.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no backend is named `{0}`")]
-pub struct UnknownBackend(pub String);
-
-impl FromStr for BackendChoice {
-    type Err = UnknownBackend;
-
-    fn from_str(text: &str) -> Result<Self, UnknownBackend> {
-        let named = Self::NAMES.iter().find(|(name, ..)| *name == text);
-        named.map(|(_, choice, _)| *choice).ok_or_else(|| UnknownBackend(text.to_owned()))
+named_enum! {
+    /// What the user asks for.
+    #[derive(Default)]
+    pub enum BackendChoice {
+        /// Embree where it is installed, the pure-Rust BVH elsewhere
+        #[default]
+        Auto = "auto",
+        /// Embree; an error where there is none
+        Embree = "embree",
+        /// The pure-Rust BVH
+        Bvh = "bvh",
+        /// A loop over all triangles, for tests
+        BruteForce = "brute-force",
     }
 }
 
@@ -68,14 +39,14 @@ pub enum Backend {
     BruteForce(BruteForceAccel),
 }
 
-/// Why no acceleration structure could be had.
+/// Why no acceleration structure could be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
-    /// Embree was asked for, and either isn't there or failed.
+    /// Embree was requested, and either isn't there or failed.
     #[cfg(feature = "embree")]
     #[error("backend embree: {0}")]
     Embree(#[from] EmbreeError),
-    /// Embree was asked for from a build without it.
+    /// Embree was requested from a build without it.
     #[cfg(not(feature = "embree"))]
     #[error("backend embree: this build has no Embree support; build with the default features")]
     NoEmbreeSupport,
@@ -112,7 +83,7 @@ impl Backend {
     /// Builds the acceleration structure of a scene.
     ///
     /// # Errors
-    /// Embree asked for by name and not to be had, or a failed build. `auto` falls back only where no Embree
+    /// Embree requested by name and not available, or a failed build. `auto` falls back only where no Embree
     /// library can be used at all; one that fails on this scene is an error.
     pub fn build(choice: BackendChoice, scene: &Scene) -> Result<Chosen, BackendError> {
         let plain = |backend| Ok(Chosen { backend, notice: None });
@@ -144,8 +115,8 @@ impl Backend {
         }
     }
 
-    /// Builds every backend that can be had: the BVH, then Embree in every version that is installed. Where there is
-    /// none, it tells why.
+    /// Builds every backend that is available: the BVH, then Embree in every version that is installed. Where there is
+    /// none, the text is the reason.
     ///
     /// # Errors
     /// As for [`Backend::build`].

@@ -7,10 +7,7 @@ use glam::Vec3;
 use crate::scene::{AlphaMasks, Hit, MaskedMesh, Ray, Scene, TriangleMesh};
 
 use super::bvh::WorldToObject;
-use super::{
-    Accel, Coherence, INVALID_ID, LaneMask, MAX_COORDINATE, RayHitPacket, RayPacket, is_valid_ray,
-    largest_coordinate,
-};
+use super::{Accel, MAX_COORDINATE, is_valid_ray, largest_coordinate};
 
 /// The reference backend for tests.
 ///
@@ -18,7 +15,7 @@ use super::{
 /// boxes, no SIMD and no stack. Its arithmetic is that of the BVH, so that hits must agree to the last bit.
 pub struct BruteForceAccel {
     instances: Vec<Placed>,
-    /// Of the coordinates of rays.
+    /// Largest magnitude of the coordinates of rays that can hit anything.
     largest: f32,
 }
 
@@ -151,40 +148,7 @@ impl Accel for BruteForceAccel {
         blocked
     }
 
-    fn intersect_packet<const N: usize>(&self, active: LaneMask, packet: &mut RayHitPacket<N>, _: Coherence) {
-        for lane in (0..N).filter(|lane| active >> lane & 1 != 0) {
-            let Some(hit) = self.intersect(&lane_of(&packet.ray, lane)) else { continue };
-            let instance = hit.instance;
-            let fixed = matches!(self.instances[instance as usize].placement, Placement::World);
-            packet.ray.tfar[lane] = hit.t;
-            packet.hit.u[lane] = hit.u;
-            packet.hit.v[lane] = hit.v;
-            packet.hit.prim_id[lane] = hit.triangle;
-            packet.hit.geom_id[lane] = if fixed { instance } else { 0 };
-            packet.hit.inst_id[lane] = if fixed { INVALID_ID } else { instance };
-        }
-    }
-
-    fn occluded_packet<const N: usize>(
-        &self,
-        active: LaneMask,
-        packet: &mut RayPacket<N>,
-        _: Coherence,
-    ) -> LaneMask {
-        let lanes = (0..N).filter(|lane| active >> lane & 1 != 0);
-        lanes.filter(|&lane| self.occluded(&lane_of(packet, lane))).map(|lane| 1 << lane).sum()
-    }
-
     fn memory_bytes(&self) -> usize {
-        0
-    }
-}
-
-fn lane_of<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {
-    Ray {
-        origin: Vec3::new(packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]),
-        direction: Vec3::new(packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]),
-        t_near: packet.tnear[lane],
-        t_far: packet.tfar[lane],
+        self.instances.capacity() * size_of::<Placed>()
     }
 }

@@ -27,7 +27,7 @@ pub enum EmbreeError {
     Mesh {
         /// Name of the mesh.
         name: String,
-        /// Why.
+        /// What Embree, or the check before it, refused.
         error: Error,
     },
     /// An instance of a mesh that the scene does not have.
@@ -61,21 +61,22 @@ impl EmbreeAccel {
         Self::build_with(&Library::load().map_err(EmbreeError::Library)?, scene)
     }
 
-    /// [`EmbreeAccel::build`] with the versions of Embree that are installed besides the one which that takes.
+    /// [`EmbreeAccel::build`] with the versions of Embree that are installed besides the one that it takes.
     ///
     /// # Errors
     ///
     /// As for [`EmbreeAccel::build`].
-    pub fn build_others(scene: &Scene) -> Result<Vec<Self>, EmbreeError> {
+    pub(super) fn build_others(scene: &Scene) -> Result<Vec<Self>, EmbreeError> {
         let libraries = Library::load_all().map_err(EmbreeError::Library)?;
         libraries.iter().skip(1).map(|library| Self::build_with(library, scene)).collect()
     }
 
-    /// [`EmbreeAccel::build`] with a library that is loaded already.
+    /// [`EmbreeAccel::build`] with a library that is loaded already; hidden, since outside of here only tests need it.
     ///
     /// # Errors
     ///
     /// As for [`EmbreeAccel::build`].
+    #[doc(hidden)]
     pub fn build_with(library: &Library, scene: &Scene) -> Result<Self, EmbreeError> {
         let threads = format!("threads={}", rayon::current_num_threads());
         let device = Device::new(library, &threads).map_err(EmbreeError::Library)?;
@@ -113,12 +114,6 @@ impl EmbreeAccel {
     /// Version of the loaded Embree, such as `4.3.3`.
     pub fn version(&self) -> String {
         self.scene.device().library().version().to_string()
-    }
-
-    /// Whether packets of this width are traversed as such by this processor; 8 is the fastest where
-    /// it is.
-    pub fn native_packets(&self, width: usize) -> bool {
-        self.scene.device().native_packets(width)
     }
 }
 
@@ -185,6 +180,6 @@ impl Accel for EmbreeAccel {
     }
 
     fn memory_bytes(&self) -> usize {
-        self.scene.device().memory_bytes()
+        self.scene.device().memory_bytes() + self.scene.handle_bytes()
     }
 }

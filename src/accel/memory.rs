@@ -8,9 +8,9 @@ use crate::scene::{Scene, TriangleMesh};
 /// Bytes of an acceleration structure, estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
-    /// When it is finished.
+    /// Bytes of the finished structure.
     pub built: u64,
-    /// At most, while it is built.
+    /// Bytes at the peak of the build.
     pub building: u64,
 }
 
@@ -27,11 +27,11 @@ const BVH: Rates = Rates { built: (80, 260), building: (170, 400) };
 /// Estimates for a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MemoryEstimate {
-    /// Of the scene's own vertices, indices and materials.
+    /// Bytes of the scene's own vertices, indices and materials.
     pub scene: u64,
-    /// In Embree.
+    /// Bytes of an acceleration structure in Embree.
     pub embree: Footprint,
-    /// In the built-in BVH.
+    /// Bytes of the built-in BVH.
     pub bvh: Footprint,
 }
 
@@ -99,7 +99,7 @@ pub fn parse_size(text: &str) -> Result<u64, String> {
 pub struct MemoryLimitError {
     /// Bytes that it would take.
     pub needed: u64,
-    /// Those of the acceleration structure among them.
+    /// Bytes of the acceleration structure among them.
     pub structure: u64,
     /// Bytes that are allowed.
     pub limit: u64,

@@ -5,7 +5,7 @@
 
 mod backend;
 mod brute_force;
-pub mod bvh;
+mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
 mod limits;
@@ -13,9 +13,9 @@ mod memory;
 mod packet;
 
 pub(crate) use backend::with_accel;
-pub use backend::{Backend, BackendChoice, BackendError, Chosen, UnknownBackend};
+pub use backend::{Backend, BackendChoice, BackendError, Chosen};
 pub use brute_force::BruteForceAccel;
-pub use bvh::{BvhAccel, BvhError};
+pub use bvh::{BvhAccel, BvhError, SimdLevel};
 #[cfg(feature = "embree")]
 pub use embree::{EmbreeAccel, EmbreeError};
 pub use limits::{MAX_COORDINATE, MIN_DIRECTION, is_valid_ray, largest_coordinate, largest_coordinate_of};
@@ -23,6 +23,7 @@ pub use memory::{Footprint, MemoryEstimate, MemoryLimitError, check_memory, pars
 pub use packet::{Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 
 use crate::scene::{Hit, Ray};
+use packet::{lanes_of_mask, set_hit_of_lane};
 
 /// Ray queries against one scene.
 ///
@@ -35,29 +36,39 @@ use crate::scene::{Hit, Ray};
 /// An acceleration structure holds geometry and alpha masks, and nothing else of the scene: cameras, lights and the
 /// other properties of materials may change without a new one.
 pub trait Accel: Send + Sync {
-    /// Nearest hit of one ray.
+    /// Closest hit of one ray.
     fn intersect(&self, ray: &Ray) -> Option<Hit>;
 
     /// Whether anything lies on one ray.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// Nearest hits of the packet's active lanes: `hit` and `ray.tfar` of lanes that hit are filled.
-    /// Lanes must come with `geom_id` and `inst_id` set to [`INVALID_ID`]; `N` is 4, 8 or 16.
+    /// Closest hits of the packet's active lanes: `hit` and `ray.tfar` of lanes that hit are filled.
+    /// Lanes must come with `geom_id` and `inst_id` set to [`INVALID_ID`]; `N` is 4, 8 or 16. Unless a backend has
+    /// packets of its own, the lanes are traced one by one.
     fn intersect_packet<const N: usize>(
         &self,
         active: LaneMask,
         packet: &mut RayHitPacket<N>,
-        coherence: Coherence,
-    );
+        _coherence: Coherence,
+    ) {
+        for lane in lanes_of_mask::<N>(active) {
+            if let Some(hit) = self.intersect(&packet.lane(lane)) {
+                set_hit_of_lane(packet, lane, &hit);
+            }
+        }
+    }
 
     /// The active lanes that are blocked. The packet's `tfar` is unspecified afterwards; `N` is 4, 8
-    /// or 16.
+    /// or 16. Unless a backend has packets of its own, the lanes are traced one by one.
     fn occluded_packet<const N: usize>(
         &self,
         active: LaneMask,
         packet: &mut RayPacket<N>,
-        coherence: Coherence,
-    ) -> LaneMask;
+        _coherence: Coherence,
+    ) -> LaneMask {
+        let blocked = lanes_of_mask::<N>(active).filter(|&lane| self.occluded(&packet.lane(lane)));
+        blocked.fold(0, |mask, lane| mask | 1 << lane)
+    }
 
     /// Bytes held by the acceleration structure, without the scene's own vertices and indices.
     fn memory_bytes(&self) -> usize;

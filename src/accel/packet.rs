@@ -2,12 +2,14 @@
 
 pub use embree_sys::packet::{INVALID_ID, RayHitPacket, RayPacket};
 
+use glam::Vec3;
+
 use crate::scene::{Hit, Ray};
 
 /// Set of active lanes of a packet: bit l stands for lane l.
 pub type LaneMask = u32;
 
-/// What the caller knows about a packet's rays; a hint that never changes an answer.
+/// How the rays of a packet lie to each other; a hint that never changes an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
     /// Neighbouring origins and directions: traverse the packet as one.
@@ -20,6 +22,9 @@ pub enum Coherence {
 pub trait PacketLanes {
     /// Puts a ray into lane `lane`.
     fn set_lane(&mut self, lane: usize, ray: &Ray);
+
+    /// The ray of lane `lane`.
+    fn lane(&self, lane: usize) -> Ray;
 }
 
 impl<const N: usize> PacketLanes for RayPacket<N> {
@@ -34,6 +39,16 @@ impl<const N: usize> PacketLanes for RayPacket<N> {
         self.dir_z[lane] = ray.direction.z;
         self.tfar[lane] = ray.t_far;
     }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> Ray {
+        Ray {
+            origin: Vec3::new(self.org_x[lane], self.org_y[lane], self.org_z[lane]),
+            direction: Vec3::new(self.dir_x[lane], self.dir_y[lane], self.dir_z[lane]),
+            t_near: self.tnear[lane],
+            t_far: self.tfar[lane],
+        }
+    }
 }
 
 impl<const N: usize> PacketLanes for RayHitPacket<N> {
@@ -43,12 +58,22 @@ impl<const N: usize> PacketLanes for RayHitPacket<N> {
         self.hit.geom_id[lane] = INVALID_ID;
         self.hit.inst_id[lane] = INVALID_ID;
     }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> Ray {
+        self.ray.lane(lane)
+    }
 }
 
-/// Reads lane `lane` after a nearest-hit query; `None` for a miss.
+/// The lanes below `N` of a mask, in order.
+pub(super) fn lanes_of_mask<const N: usize>(mask: LaneMask) -> impl Iterator<Item = usize> {
+    (0..N).filter(move |lane| mask >> lane & 1 != 0)
+}
+
+/// Reads lane `lane` after a closest-hit query; `None` for a miss.
 ///
-/// Geometry that is not instanced carries the instance index as `geom_id`; for instanced geometry
-/// `inst_id` does.
+/// The instance index is the packet's `inst_id`, or its `geom_id` where that is [`INVALID_ID`]: Embree fills `inst_id` for
+/// instanced geometry only.
 #[inline(always)]
 pub fn hit_of_lane<const N: usize>(packet: &RayHitPacket<N>, lane: usize) -> Option<Hit> {
     let geometry = packet.hit.geom_id[lane];
@@ -63,4 +88,15 @@ pub fn hit_of_lane<const N: usize>(packet: &RayHitPacket<N>, lane: usize) -> Opt
         instance: if instance == INVALID_ID { geometry } else { instance },
         triangle: packet.hit.prim_id[lane],
     })
+}
+
+/// Writes the closest hit of lane `lane`, for [`hit_of_lane`] to read.
+#[inline(always)]
+pub(super) fn set_hit_of_lane<const N: usize>(packet: &mut RayHitPacket<N>, lane: usize, hit: &Hit) {
+    packet.ray.tfar[lane] = hit.t;
+    packet.hit.u[lane] = hit.u;
+    packet.hit.v[lane] = hit.v;
+    packet.hit.prim_id[lane] = hit.triangle;
+    packet.hit.geom_id[lane] = hit.instance;
+    packet.hit.inst_id[lane] = INVALID_ID;
 }

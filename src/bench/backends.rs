@@ -10,8 +10,8 @@ use super::{BenchError, BenchOptions};
 use crate::accel::{
     Accel, Backend, BackendChoice, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane, with_accel,
 };
-use crate::light_mesh::SphereStrata;
-use crate::scene::random::SplitMix64;
+use crate::sampling::SphereStrata;
+use crate::sampling::SplitMix64;
 use crate::scene::{CameraRays, Ray};
 
 /// Rays of one kind, in an order in which neighbours make good packets.

@@ -5,7 +5,8 @@ use std::fmt;
 use glam::Vec3;
 
 use crate::settings::{
-    Estimator, Integrator, Leaks, LightMeshSettings, PointLayout, PointSettings, Radius, Settings, Spacing,
+    Estimator, Integrator, KernelSettings, Leaks, MeshSettings, Named, PointLayout, PointSettings, Radius,
+    Settings, ShadingSettings, Spacing,
 };
 
 /// A choice of light-mesh settings. R is fixed in scene units, so that all spacings approximate the same image.
@@ -33,25 +34,9 @@ pub const LAYOUTS: [PointLayout; 4] = [
     PointLayout::BlueNoise { seed: 1 },
 ];
 
-/// Name of an estimator as on the command line.
-pub fn estimator_name(estimator: Estimator) -> &'static str {
-    match estimator {
-        Estimator::PerLight => "per-light",
-        Estimator::Directional => "directional",
-        Estimator::Ratio => "ratio",
-        Estimator::Paper => "paper",
-    }
-}
-
 /// Name of a layout as in the scene file.
 pub fn layout_name(layout: &PointLayout) -> &'static str {
-    match layout {
-        PointLayout::Regular => "regular",
-        PointLayout::BodyCentred => "body-centred",
-        PointLayout::Jittered { .. } => "jittered",
-        PointLayout::BlueNoise { .. } => "blue-noise",
-        PointLayout::List(_) => "list",
-    }
+    layout.name().map_or("list", Named::name)
 }
 
 impl Configuration {
@@ -59,42 +44,49 @@ impl Configuration {
     ///
     /// Nothing is done against leaks: leaves are no walls, and the reference averages over the same points.
     pub fn settings(&self, base: &Settings, resolution: (u32, u32)) -> Settings {
-        Settings {
-            resolution,
-            integrator: Integrator::LightMesh,
-            light_mesh: LightMeshSettings {
-                estimator: self.estimator,
-                points: PointSettings {
-                    layout: self.layout.clone(),
-                    spacing: Spacing::Units(Vec3::splat(self.spacing)),
-                    radius: Radius::Units(self.radius),
-                    leaks: Leaks::Allow,
-                    ..PointSettings::default()
-                },
-                ..LightMeshSettings::default()
+        let mut settings = base.clone();
+        settings.view.resolution = resolution;
+        settings.mesh = MeshSettings {
+            direct: PointSettings {
+                layout: self.layout.clone(),
+                spacing: Spacing::Units(Vec3::splat(self.spacing)),
+                regions: Vec::new(),
             },
-            ..base.clone()
-        }
+            indirect: None,
+        };
+        settings.shading = ShadingSettings {
+            integrator: Integrator::LightMesh,
+            estimator: self.estimator,
+            kernel: KernelSettings {
+                radius: Radius::Units(self.radius),
+                leaks: Leaks::Allow,
+                ..KernelSettings::default()
+            },
+            ..ShadingSettings { lambertian: base.shading.lambertian, ..ShadingSettings::default() }
+        };
+        settings
     }
 
     /// The settings of what it approximates.
     pub fn reference(&self, base: &Settings, resolution: (u32, u32), samples: u32) -> Settings {
-        Settings {
-            integrator: Integrator::Reference,
-            reference_samples: samples,
-            ..self.settings(base, resolution)
-        }
+        let mut settings = self.settings(base, resolution);
+        settings.shading.integrator = Integrator::Reference;
+        settings.shading.reference_samples = samples;
+        settings
     }
 }
 
 /// The settings of conventional tracing.
 pub fn conventional(base: &Settings, resolution: (u32, u32)) -> Settings {
-    Settings { resolution, integrator: Integrator::Conventional, ..base.clone() }
+    let mut settings = base.clone();
+    settings.view.resolution = resolution;
+    settings.shading.integrator = Integrator::Conventional;
+    settings
 }
 
 impl fmt::Display for Configuration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (estimator, layout) = (estimator_name(self.estimator), layout_name(&self.layout));
+        let (estimator, layout) = (self.estimator, layout_name(&self.layout));
         write!(f, "{estimator}, {layout}, spacing {}, R {}", self.spacing, self.radius)
     }
 }

@@ -1,11 +1,11 @@
 //! Error over time of light meshes, and the choice of the fastest ones that are good enough.
 
-use super::configuration::{Configuration, ESTIMATORS, LAYOUTS, conventional, estimator_name, layout_name};
+use super::configuration::{Configuration, ESTIMATORS, LAYOUTS, conventional, layout_name};
 use super::report::{Plot, Report, Series, Table};
 use super::setup::{Setup, relative_rmse};
 use super::{BenchError, BenchOptions};
 use crate::accel::Backend;
-use crate::render::Film;
+use crate::image::Image;
 use crate::settings::Estimator;
 
 /// A configuration with what it costs and how far it is off.
@@ -59,8 +59,8 @@ pub fn measure(
         let configuration =
             |estimator| Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: radius, radius };
         let reference = |estimator| {
-            log(&format!("reference for {} at R {radius}", estimator_name(estimator)));
-            reference_film(
+            log(&format!("reference for {} at R {radius}", estimator));
+            reference_image(
                 setup,
                 backend,
                 &configuration(estimator),
@@ -70,7 +70,7 @@ pub fn measure(
         };
         let exact = reference(Estimator::PerLight)?;
         let hard = conventional(&setup.settings, (sizes.error_side, sizes.error_side));
-        let softness = relative_rmse(&exact, &setup.frame(backend, &hard)?.film)?;
+        let softness = relative_rmse(&exact, &setup.frame(backend, &hard)?.image);
         let mut table = Table::new(
             format!(
                 "Error over time at R = {radius}, {0}×{0} pixels; the image it approximates differs from hard \
@@ -89,17 +89,15 @@ pub fn measure(
         for estimator in ESTIMATORS {
             let own = if estimator == Estimator::PerLight { exact.clone() } else { reference(estimator)? };
             for layout in &LAYOUTS {
-                let mut series = Series {
-                    label: format!("{} {}", estimator_name(estimator), layout_name(layout)),
-                    points: Vec::new(),
-                };
+                let mut series =
+                    Series { label: format!("{} {}", estimator, layout_name(layout)), points: Vec::new() };
                 for &spacing in spacings {
                     let layout = layout.clone();
                     let configuration = Configuration { estimator, layout, spacing, radius };
                     let tried = attempt(setup, backend, configuration, &sizes, [&own, &exact], report)?;
                     series.points.push((tried.seconds, tried.own_error));
                     table.rows.push(vec![
-                        estimator_name(estimator).to_owned(),
+                        estimator.to_string(),
                         layout_name(&tried.configuration.layout).to_owned(),
                         spacing.to_string(),
                         format!("{:.2}", 100.0 * tried.own_error),
@@ -118,15 +116,15 @@ pub fn measure(
 }
 
 /// The image that light meshes of a configuration approximate, `side` pixels wide and high.
-pub fn reference_film(
+pub fn reference_image(
     setup: &Setup,
     backend: &Backend,
     configuration: &Configuration,
     side: u32,
     samples: u32,
-) -> Result<Film, BenchError> {
+) -> Result<Image, BenchError> {
     let settings = configuration.reference(&setup.settings, (side, side), samples);
-    Ok(setup.frame(backend, &settings)?.film)
+    Ok(setup.frame(backend, &settings)?.image)
 }
 
 fn attempt(
@@ -134,30 +132,27 @@ fn attempt(
     backend: &Backend,
     configuration: Configuration,
     sizes: &Sizes,
-    [own, exact]: [&Film; 2],
+    [own, exact]: [&Image; 2],
     report: &mut Report,
 ) -> Result<Tried, BenchError> {
     let settings = configuration.settings(&setup.settings, (sizes.time_side, sizes.time_side));
     let frame = setup.frame(backend, &settings)?;
-    let film = every(&frame.film, sizes.time_side / sizes.error_side);
+    let image = every(&frame.image, sizes.time_side / sizes.error_side)?;
     let seconds = report.record(format!("curve: {configuration}"), vec![frame.seconds]);
     Ok(Tried {
-        own_error: relative_rmse(&film, own)?,
-        exact_error: relative_rmse(&film, exact)?,
+        own_error: relative_rmse(&image, own),
+        exact_error: relative_rmse(&image, exact),
         configuration,
         seconds,
     })
 }
 
 /// The middle pixels of squares of `step` by `step` pixels.
-fn every(film: &Film, step: u32) -> Film {
-    let (width, height) = film.resolution;
+fn every(image: &Image, step: u32) -> Result<Image, BenchError> {
+    let (width, height) = (image.width(), image.height());
     let middles = |side: u32| (step / 2..side).step_by(step as usize);
-    let pixels = middles(height)
-        .flat_map(|y| middles(width).map(move |x| (y * width + x) as usize))
-        .filter_map(|at| film.pixels.get(at).copied())
-        .collect();
-    Film { resolution: (width / step, height / step), pixels }
+    let pixels = middles(height).flat_map(|y| middles(width).filter_map(move |x| image.get(x, y))).collect();
+    Ok(Image::from_pixels(width / step, height / step, pixels)?)
 }
 
 /// The fastest configuration whose errors, own and exact, are both within `limit`; if there is none, the one with the
@@ -188,9 +183,9 @@ mod tests {
     #[test]
     fn middles_of_squares_are_kept() {
         let pixels = (0..54).map(|i| [i as f32; 3]).collect();
-        let kept = every(&Film { resolution: (9, 6), pixels }, 3);
-        assert_eq!(kept.resolution, (3, 2));
-        let values: Vec<f32> = kept.pixels.iter().map(|pixel| pixel[0]).collect();
+        let kept = every(&Image::from_pixels(9, 6, pixels).unwrap(), 3).unwrap();
+        assert_eq!((kept.width(), kept.height()), (3, 2));
+        let values: Vec<f32> = kept.pixels().iter().map(|pixel| pixel[0]).collect();
         assert_eq!(values, [10.0, 13.0, 16.0, 37.0, 40.0, 43.0]);
     }
 

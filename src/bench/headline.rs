@@ -1,7 +1,7 @@
 //! The paper's comparison: one forest, by light mesh and by conventional tracing.
 
 use super::configuration::{Configuration, conventional};
-use super::curve::{self, Tried, fastest_within, reference_film};
+use super::curve::{self, Tried, fastest_within, reference_image};
 use super::report::{Aim, Goal, Report, Table};
 use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, forest, new_report, relative_rmse};
 use super::timing::Samples;
@@ -165,9 +165,9 @@ impl Case<'_> {
         let (side, samples) = if options.quick { (8, 16) } else { (24, 128) };
         let mut table = Table::new(format!("Own error with {} lights", self.lights), &["", "error %"]);
         for configuration in configurations {
-            let reference = reference_film(self.setup, self.backend, configuration, side, samples)?;
+            let reference = reference_image(self.setup, self.backend, configuration, side, samples)?;
             let settings = configuration.settings(&self.setup.settings, (side, side));
-            let error = relative_rmse(&self.setup.frame(self.backend, &settings)?.film, &reference)?;
+            let error = relative_rmse(&self.setup.frame(self.backend, &settings)?.image, &reference);
             table.rows.push(vec![configuration.to_string(), format!("{:.2}", 100.0 * error)]);
         }
         report.tables.push(table);

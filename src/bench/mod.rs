@@ -17,7 +17,6 @@ mod shading;
 mod threads;
 mod timing;
 
-use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -27,42 +26,24 @@ pub use report::Report;
 use self::timing::Budget;
 use crate::accel::{BackendChoice, BackendError};
 use crate::image::ImageError;
-use crate::light_mesh::MeshError;
+use crate::render::{RenderError, SessionError};
 use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
+use crate::settings::named_enum;
 
-/// What can be measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Benchmark {
-    /// The paper's comparison: a forest by light mesh and by conventional tracing.
-    #[default]
-    Headline,
-    /// Time over resolution, lights, triangles, spacing and threads.
-    Scaling,
-    /// Rays per second of all backends, by kind of ray and packet width.
-    Backends,
-    /// Evaluation of mesh points against a loop that only traces the same rays.
-    Rays,
-}
-
-impl Benchmark {
-    /// The name of each benchmark, the benchmark, and what it measures.
-    pub const NAMES: [(&'static str, Self, &'static str); 4] = [
-        (
-            "headline",
-            Self::Headline,
-            "The paper's comparison: a forest by light mesh and by conventional tracing",
-        ),
-        ("scaling", Self::Scaling, "Time over resolution, lights, triangles, spacing and threads"),
-        ("backends", Self::Backends, "Rays per second of all backends, by kind of ray and packet width"),
-        ("rays", Self::Rays, "Evaluation of mesh points against a loop that only traces the same rays"),
-    ];
-}
-
-impl fmt::Display for Benchmark {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::NAMES.iter().find(|(_, benchmark, _)| benchmark == self);
-        f.write_str(named.map_or("", |(name, ..)| name))
+named_enum! {
+    /// What can be measured.
+    #[derive(Default)]
+    pub enum Benchmark {
+        /// The paper's comparison: a forest by light mesh and by conventional tracing
+        #[default]
+        Headline = "headline",
+        /// Time over resolution, lights, triangles, spacing and threads
+        Scaling = "scaling",
+        /// Rays per second of all backends, by kind of ray and packet width
+        Backends = "backends",
+        /// Evaluation of mesh points against a loop that only traces the same rays
+        Rays = "rays",
     }
 }
 
@@ -106,9 +87,12 @@ pub enum BenchError {
     /// No backend.
     #[error(transparent)]
     Backend(#[from] BackendError),
-    /// A light mesh can't be set up.
+    /// The scene contradicts itself.
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Session(#[from] SessionError),
+    /// A frame can't be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
     /// An image can't be held.
     #[error(transparent)]
     Image(#[from] ImageError),

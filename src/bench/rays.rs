@@ -8,9 +8,13 @@ use super::setup::{PAPER_LIGHTS, PAPER_TRIANGLES, forest, new_report};
 use super::timing::timed;
 use super::{BenchError, BenchOptions};
 use crate::accel::{Accel, Backend, Coherence, PacketLanes, RayPacket, with_accel};
-use crate::light_mesh::{Basis, DirectValues, LANES, LightTable, MeshPoints, PointMask};
-use crate::scene::{PointLight, Ray, Scene};
-use crate::settings::{PointSettings, Spacing};
+use crate::light_mesh::direct::{Basis, DirectField, DirectMesh};
+use crate::lights::{EmissiveTriangles, PackedLights};
+use crate::render::RenderError;
+use crate::scene::{PointLight, Ray, Scene, SurfacePoint};
+use crate::settings::{Estimator, KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
+use crate::simd::LANES;
+use crate::world::World;
 
 /// Spacing of the mesh points, scene units.
 const SPACING: f32 = 0.5;
@@ -20,23 +24,27 @@ const GOAL: f64 = 0.9;
 
 /// Runs the comparison.
 pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchError> {
-    let (triangles, lights, bricks) =
-        if options.quick { (2_000, 20, 8) } else { (PAPER_TRIANGLES, PAPER_LIGHTS, 400) };
+    let (triangles, lights, count) =
+        if options.quick { (2_000, 20, 512) } else { (PAPER_TRIANGLES, PAPER_LIGHTS, 25_600) };
     let setup = forest(triangles, lights)?;
     let backend = Backend::build(options.backend, &setup.scene)?.backend;
     let mut report = new_report("rays", backend.to_string(), options);
-    let table = LightTable::of_scene(&setup.scene);
-    let points = mesh_points(&setup.scene, bricks)?;
+    let table = PackedLights::of_scene(&setup.scene);
+    let points = mesh_points(&setup.scene, &backend, &table, count)?;
     let rays = points.len() * table.len();
     log(&format!("{} mesh points, {} lights, {rays} rays", points.len(), table.len()));
 
-    let variants = [Basis::Bits, Basis::Scalar, Basis::Directional];
+    let variants = [Basis::Bits, Basis::Light, Basis::Irradiance];
     let times = with_accel!(&backend, accel => {
         options.budget().alternate(variants.len() + 3, |variant| {
             let (seconds, _) = match variants.get(variant) {
                 Some(&basis) => {
-                    let mut values = DirectValues::default();
-                    timed(|| values.evaluate(accel, &table, basis, &points))
+                    let mut field = DirectField::default();
+                    timed(|| {
+                        let rays = field.trace(accel, &table, &points);
+                        field.derive(&table, basis, &points);
+                        rays
+                    })
                 }
                 None if variant == variants.len() => {
                     timed(|| points_to_one_light(accel, &points, &setup.scene.lights, Coherence::Incoherent))
@@ -85,15 +93,28 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
     Ok(report)
 }
 
-/// Mesh points in the order in which rendering evaluates them: whole bricks from the middle of the scene.
-fn mesh_points(scene: &Scene, bricks: u64) -> Result<Vec<Vec3>, BenchError> {
-    let settings =
-        PointSettings { spacing: Spacing::Units(Vec3::splat(SPACING)), ..PointSettings::default() };
-    let mut points = MeshPoints::new(scene.bounds(), &settings)?;
-    let all = points.counters.total.div_ceil(64);
-    let first = all.saturating_sub(bricks) / 2;
-    let mask = PointMask::union((first..(first + bricks).min(all)).map(|brick| (brick, u64::MAX)));
-    Ok(points.claim(&mask))
+/// About `count` mesh points around the middle of the scene, in the order in which rendering evaluates them.
+fn mesh_points(
+    scene: &Scene,
+    backend: &Backend,
+    lights: &PackedLights,
+    count: u32,
+) -> Result<Vec<Vec3>, BenchError> {
+    let points = PointSettings { spacing: Spacing::Units(Vec3::splat(SPACING)), ..PointSettings::default() };
+    let kernel = KernelSettings {
+        // The ball that holds as many cubes of one spacing.
+        radius: Radius::Spacings((0.75 * count as f32 / std::f32::consts::PI).cbrt()),
+        neighbourhood: Neighbourhood::Sphere,
+        hemisphere: false,
+        ..KernelSettings::default()
+    };
+    let mut mesh = DirectMesh::new(scene.bounds());
+    let shading = mesh.shading(&points, &kernel, Estimator::PerLight).map_err(RenderError::from)?;
+    let middle = SurfacePoint::flat(scene.bounds().center(), Vec3::Y);
+    let needed = mesh.view(lights, &shading).lookup.needed_anywhere([middle].iter());
+    let emissive = EmissiveTriangles::default();
+    mesh.evaluate(World { accel: backend, scene, lights, emissive: &emissive }, &shading, &needed);
+    Ok(mesh.store().positions().to_vec())
 }
 
 /// Traces from packets of neighbouring points towards one light after the other; returns the blocked rays.

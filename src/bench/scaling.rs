@@ -2,14 +2,14 @@
 
 use std::process::{Command, Stdio};
 
-use super::configuration::{Configuration, conventional, estimator_name};
+use super::configuration::{Configuration, conventional};
 use super::report::{Aim, Goal, Plot, Report, Series, Table};
 use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, forest, new_report, temporary_folder};
 use super::timing::timed;
 use super::{BenchError, BenchOptions, shading, threads};
 use crate::accel::Backend;
 use crate::scene::generate::forest::Forest;
-use crate::settings::{Estimator, PointLayout, Settings};
+use crate::settings::{Estimator, Named, PointLayout, Settings};
 
 /// Conventional tracing is left out above this number of (pixel, light) pairs: it would take minutes.
 const MAX_PAIRS: u64 = 600_000_000;
@@ -152,7 +152,7 @@ impl Axis {
         let resolution = (side, side);
         let mut variants: Vec<(&str, Settings)> = configurations(spacing)
             .iter()
-            .map(|mesh| (estimator_name(mesh.estimator), mesh.settings(&setup.settings, resolution)))
+            .map(|mesh| (mesh.estimator.name(), mesh.settings(&setup.settings, resolution)))
             .collect();
         let pairs = u64::from(side) * u64::from(side) * setup.scene.lights.len() as u64;
         if pairs <= MAX_PAIRS {

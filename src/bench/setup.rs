@@ -10,8 +10,7 @@ use super::{BenchError, BenchOptions};
 use crate::accel::Backend;
 use crate::image::Image;
 use crate::image::metrics::{MetricsOptions, compare};
-use crate::light_mesh::MeshError;
-use crate::render::{Film, RenderStats, render};
+use crate::render::{RenderError, RenderStats, render};
 use crate::scene::generate::forest::Forest;
 use crate::scene::load::load_scene_file;
 use crate::scene::{Camera, Scene};
@@ -37,7 +36,7 @@ pub struct Setup {
 /// A frame and its time.
 pub struct Frame {
     /// The image.
-    pub film: Film,
+    pub image: Image,
     /// Counters and seconds per stage.
     pub stats: RenderStats,
     /// Wall-clock seconds of the whole frame, from nothing but scene and acceleration structure.
@@ -65,19 +64,18 @@ pub fn forest(triangles: u32, lights: u32) -> Result<Setup, BenchError> {
 
 impl Setup {
     /// Renders a frame; light meshes start with no point known.
-    pub fn frame(&self, backend: &Backend, settings: &Settings) -> Result<Frame, MeshError> {
-        let (seconds, rendered) = timed(|| render(backend, &self.scene, &self.camera, settings, &()));
-        let (film, stats) = rendered?;
-        Ok(Frame { film, stats, seconds })
+    pub fn frame(&self, backend: &Backend, settings: &Settings) -> Result<Frame, RenderError> {
+        let (seconds, rendered) = timed(|| render(backend, &self.scene, &self.camera, settings));
+        let (image, stats) = rendered?;
+        Ok(Frame { image, stats, seconds })
     }
 }
 
 /// Root of the mean squared difference of two images over the mean of the second.
-pub fn relative_rmse(film: &Film, reference: &Film) -> Result<f64, BenchError> {
-    let image = |film: &Film| Image::from_pixels(film.resolution.0, film.resolution.1, film.pixels.clone());
+pub fn relative_rmse(image: &Image, reference: &Image) -> f64 {
     // Images of one size can be compared; a black reference has no relative error.
-    let metrics = compare(&image(film)?, &image(reference)?, MetricsOptions::default()).ok();
-    Ok(metrics.and_then(|metrics| metrics.relative_rmse).unwrap_or(f64::NAN))
+    let metrics = compare(image, reference, MetricsOptions::default()).ok();
+    metrics.and_then(|metrics| metrics.relative_rmse).unwrap_or(f64::NAN)
 }
 
 /// An empty report.

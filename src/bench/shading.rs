@@ -4,8 +4,8 @@ use super::configuration::Configuration;
 use super::report::{Aim, Goal, Report, Table};
 use super::setup::{Setup, forest};
 use super::{BenchError, BenchOptions};
-use crate::accel::Backend;
-use crate::render::{LightMeshes, render_light_mesh};
+use crate::render::Session;
+use crate::scene::Camera;
 use crate::settings::Settings;
 
 /// What shading with many lights may take at most, over shading with few.
@@ -13,10 +13,9 @@ const GOAL: f64 = 1.2;
 
 /// A forest with light meshes whose points are all known.
 struct Warm {
-    setup: Setup,
+    session: Session,
+    camera: Camera,
     settings: Settings,
-    backend: Backend,
-    meshes: LightMeshes,
 }
 
 impl Warm {
@@ -27,20 +26,17 @@ impl Warm {
         side: u32,
         options: &BenchOptions,
     ) -> Result<Self, BenchError> {
-        let setup = forest(triangles, lights)?;
-        let settings = configuration.settings(&setup.settings, (side, side));
-        let backend = Backend::build(options.backend, &setup.scene)?.backend;
-        let meshes = LightMeshes::new(&setup.scene, &settings)?;
-        let mut warm = Self { setup, settings, backend, meshes };
-        warm.shade();
+        let Setup { scene, camera, settings, .. } = forest(triangles, lights)?;
+        let settings = configuration.settings(&settings, (side, side));
+        let mut warm = Self { session: Session::new(scene, options.backend)?, camera, settings };
+        warm.shade()?;
         Ok(warm)
     }
 
     /// Seconds that shading takes in one frame.
-    fn shade(&mut self) -> f64 {
-        let Self { setup: Setup { scene, camera, .. }, settings, backend, meshes } = self;
-        let (_, stats) = render_light_mesh(backend, scene, camera, settings, meshes, &());
-        stats.seconds.shade
+    fn shade(&mut self) -> Result<f64, BenchError> {
+        let (_, stats) = self.session.render(&self.camera, &self.settings)?;
+        Ok(stats.seconds.shade)
     }
 }
 
@@ -56,8 +52,7 @@ pub fn measure(
 ) -> Result<(), BenchError> {
     let warm = |lights| Warm::new(triangles, lights, configuration, side, options);
     let mut forests = [warm(few)?, warm(many)?];
-    let times =
-        options.budget().often().alternate(2, |variant| Ok::<_, BenchError>(forests[variant].shade()))?;
+    let times = options.budget().often().alternate(2, |variant| forests[variant].shade())?;
     let mut table = Table::new(
         format!("Shading with lights that are known at the mesh points, {side}×{side}"),
         &["lights", "seconds"],

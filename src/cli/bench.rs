@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::choice::one_of;
+use super::choice::named;
 use super::error::{CommandError, Outcome};
 use super::shared::{BackendArgs, QuietArgs, ThreadArgs};
 use crate::bench::{self, BenchOptions, Benchmark};
@@ -16,7 +16,7 @@ use crate::image::OutputFile;
 #[derive(Args, Clone, Debug)]
 pub struct BenchArgs {
     /// What to measure
-    #[arg(default_value_t, value_parser = one_of(&Benchmark::NAMES))]
+    #[arg(default_value_t, value_parser = named::<Benchmark>())]
     benchmark: Benchmark,
     /// Write raw times and goals as JSON
     #[arg(long, value_name = "FILE")]

@@ -2,20 +2,10 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-/// A value with its name, and what it stands for; that may be empty.
-pub type Named<T> = (&'static str, T, &'static str);
+use crate::settings::Named;
 
-/// A parser that takes the name of one of `values` and gives the value. Help lists the names.
-pub fn one_of<T>(values: &'static [Named<T>]) -> impl TypedValueParser<Value = T>
-where
-    T: Copy + Send + Sync + 'static,
-{
-    let names = values.iter().map(|&(name, _, meaning)| {
-        let value = PossibleValue::new(name);
-        if meaning.is_empty() { value } else { value.help(meaning) }
-    });
-    PossibleValuesParser::new(names).try_map(move |text: String| {
-        let named = values.iter().find(|(name, ..)| *name == text);
-        named.map(|(_, value, _)| *value).ok_or("not one of the names")
-    })
+/// A parser that takes the name of a value and gives the value. Help lists the names.
+pub fn named<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let values = T::NAMES.iter().map(|&(name, _, meaning)| PossibleValue::new(name).help(meaning));
+    PossibleValuesParser::new(values).try_map(|text: String| T::named(&text))
 }

@@ -13,7 +13,6 @@ use super::shared::{MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use crate::accel::{Backend, BackendChoice};
 use crate::crosscheck::{Options, Subject, crosscheck, from_text, replay, watertightness};
 use crate::image::OutputFile;
-use crate::render::Progress;
 use crate::scene::Ray;
 
 /// What `crosscheck` takes.
@@ -85,7 +84,7 @@ pub fn run(args: &CrosscheckArgs, out: &mut dyn Write) -> Result<Outcome, Comman
     let report = pool.install(|| {
         crosscheck(scene, &loaded.cameras, &subjects, &options, &|rays| {
             let before = done.fetch_add(rays, std::sync::atomic::Ordering::Relaxed);
-            bar.pixels(before + rays, args.rays);
+            bar.set(before + rays, args.rays);
         })
     });
     bar.finish();

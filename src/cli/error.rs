@@ -10,7 +10,7 @@ use crate::bench::BenchError;
 use crate::crosscheck::RayTextError;
 use crate::image::ImageError;
 use crate::image::metrics::MetricsError;
-use crate::light_mesh::MeshError;
+use crate::render::{RenderError, SessionError};
 use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
 
@@ -58,13 +58,21 @@ pub enum CommandError {
     /// The backend is missing or failed.
     #[error(transparent)]
     Backend(#[from] BackendError),
-    /// The light meshes don't fit the scene.
+    /// The scene contradicts itself.
     #[error("{}", scene.display())]
-    Mesh {
+    Session {
         /// The scene file.
         scene: PathBuf,
         /// Why.
-        source: MeshError,
+        source: SessionError,
+    },
+    /// There is no image.
+    #[error("{}", scene.display())]
+    Render {
+        /// The scene file.
+        scene: PathBuf,
+        /// Why.
+        source: RenderError,
     },
     /// A scene has no camera of that name.
     #[error("{}: no camera is named `{name}`; there are: {names}", scene.display())]

@@ -12,9 +12,10 @@ use crate::framing::choose_view;
 use crate::image::OutputFile;
 use crate::image::tone::auto_exposure;
 use crate::render::render;
+use crate::scene::load::scene_file::FalloffName;
 use crate::scene::load::{ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, LightShape, PointLight};
-use crate::settings::{Integrator, Settings, Spacing};
+use crate::settings::{Integrator, Resolve, Spacing};
 
 /// What `init` takes.
 #[derive(Args, Debug)]
@@ -64,11 +65,12 @@ pub fn run(args: &InitArgs) -> Result<Outcome, CommandError> {
 /// Exposure by a small image.
 fn exposure(opened: &OpenedScene, backend: &Backend) -> f32 {
     let loaded = &opened.loaded;
-    let settings =
-        Settings { resolution: PREVIEW, integrator: Integrator::Conventional, ..loaded.settings.clone() };
+    let mut settings = loaded.settings.clone();
+    settings.view.resolution = PREVIEW;
+    settings.shading.integrator = Integrator::Conventional;
     let Some(camera) = loaded.cameras.first() else { return 0.0 };
-    let film = render(backend, &loaded.scene, camera, &settings, &());
-    film.map_or(0.0, |(film, _)| auto_exposure(&film.pixels))
+    let rendered = render(backend, &loaded.scene, camera, &settings);
+    rendered.map_or(0.0, |(image, _)| auto_exposure(image.pixels()))
 }
 
 /// The model as the scene file has to name it.
@@ -98,7 +100,7 @@ fn scene_file(
         let _ = writeln!(text, "{content}");
     };
     line("# Lights in candela (W/sr) at point lights, in lux at directional ones.".to_owned());
-    line("falloff = \"inverse-square\"".to_owned());
+    line(format!("falloff = \"{}\"", FalloffName::InverseSquare));
     if let Some(camera) = loaded.cameras.first() {
         line(String::new());
         if has_cameras {
@@ -110,20 +112,20 @@ fn scene_file(
         }
         line(camera_table(camera));
     }
-    let (width, height) = loaded.settings.resolution;
+    let (width, height) = loaded.settings.view.resolution;
     line("\n[render]".to_owned());
     line(format!("resolution = [{width}, {height}]"));
     line("lambertian = true".to_owned());
     line("# Stops; each doubles the brightness of PNG images.".to_owned());
     line(format!("exposure = {exposure:?}"));
     line("\n[light_mesh]".to_owned());
-    if let Spacing::Units(spacing) = loaded.settings.light_mesh.points.spacing {
+    if let Spacing::Units(spacing) = loaded.settings.mesh.direct.spacing {
         line("# Distance between mesh points, from the model's size and its lights.".to_owned());
         line(format!("spacing = {:?}", spacing.x));
     }
     line("radius_in_spacings = 2.0".to_owned());
     line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
-    line("resolve = \"trace\"".to_owned());
+    line(format!("resolve = \"{}\"", Resolve::Trace));
     line("\n# Indirect light: remove the # to have it.\n# [light_mesh.indirect]".to_owned());
     line("\n[[geometry]]".to_owned());
     line(format!("file = {}", quoted(file)));

@@ -2,49 +2,28 @@
 
 use clap::Args;
 
-use super::choice::{Named, one_of};
+use super::choice::named;
 use super::parse;
 use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Settings, Spacing};
-
-const INTEGRATORS: [Named<Integrator>; 3] = [
-    ("light-mesh", Integrator::LightMesh, ""),
-    ("conventional", Integrator::Conventional, ""),
-    ("reference", Integrator::Reference, ""),
-];
-
-const ESTIMATORS: [Named<Estimator>; 4] = [
-    ("paper", Estimator::Paper, ""),
-    ("ratio", Estimator::Ratio, ""),
-    ("per-light", Estimator::PerLight, ""),
-    ("directional", Estimator::Directional, ""),
-];
-
-const NEIGHBOURHOODS: [Named<Neighbourhood>; 3] = [
-    ("nearest", Neighbourhood::Nearest, ""),
-    ("sphere", Neighbourhood::Sphere, ""),
-    ("smooth-sphere", Neighbourhood::SmoothSphere, ""),
-];
-
-const RESOLVES: [Named<Resolve>; 2] = [("average", Resolve::Average, ""), ("trace", Resolve::Trace, "")];
 
 /// Settings of the scene file that flags can override.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Instead of the scene file's settings")]
 pub struct Overrides {
     /// What computes the light at surfaces
-    #[arg(long, value_parser = one_of(&INTEGRATORS))]
+    #[arg(long, value_parser = named::<Integrator>())]
     integrator: Option<Integrator>,
     /// With the integrator `reference`: positions around each surface point at which the light is evaluated
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     reference_samples: Option<u32>,
     /// How direct light follows from the light mesh
-    #[arg(long, value_parser = one_of(&ESTIMATORS))]
+    #[arg(long, value_parser = named::<Estimator>())]
     estimator: Option<Estimator>,
     /// Which mesh points a surface point takes
-    #[arg(long, value_parser = one_of(&NEIGHBOURHOODS))]
+    #[arg(long, value_parser = named::<Neighbourhood>())]
     neighbourhood: Option<Neighbourhood>,
     /// What per-light does where mesh points disagree
-    #[arg(long, value_parser = one_of(&RESOLVES))]
+    #[arg(long, value_parser = named::<Resolve>())]
     resolve: Option<Resolve>,
     /// Radius of the neighbourhood in scene units, or in spacings: 2.5s
     #[arg(long, value_name = "R", value_parser = parse::radius)]
@@ -66,17 +45,17 @@ pub struct Overrides {
 impl Overrides {
     /// Replaces the settings that flags were given for.
     pub fn apply(&self, settings: &mut Settings) {
-        let mesh = &mut settings.light_mesh;
-        set(&mut settings.integrator, self.integrator);
-        set(&mut settings.reference_samples, self.reference_samples);
-        set(&mut mesh.estimator, self.estimator);
-        set(&mut mesh.resolve, self.resolve);
-        set(&mut mesh.points.neighbourhood, self.neighbourhood);
-        set(&mut mesh.points.radius, self.radius);
-        set(&mut mesh.points.spacing, self.spacing);
-        set(&mut settings.resolution, self.resolution);
-        set(&mut settings.samples_per_pixel, self.spp);
-        set(&mut settings.exposure, self.exposure);
+        let Settings { view, mesh, shading, output } = settings;
+        set(&mut shading.integrator, self.integrator);
+        set(&mut shading.reference_samples, self.reference_samples);
+        set(&mut shading.estimator, self.estimator);
+        set(&mut shading.resolve, self.resolve);
+        set(&mut shading.kernel.neighbourhood, self.neighbourhood);
+        set(&mut shading.kernel.radius, self.radius);
+        set(&mut mesh.direct.spacing, self.spacing);
+        set(&mut view.resolution, self.resolution);
+        set(&mut view.samples_per_pixel, self.spp);
+        set(&mut output.exposure, self.exposure);
     }
 }
 

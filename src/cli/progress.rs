@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::render::Progress;
+use crate::render::{Tile, TileSink};
 
 /// Reports to the user on stderr: notices always unless quiet, progress bars on a terminal only.
 pub struct Reporter {
@@ -50,19 +50,25 @@ impl Reporter {
     }
 }
 
-/// A progress bar over pixels.
+/// A progress bar.
 pub struct Bar(ProgressBar);
 
 impl Bar {
+    /// Shows that as much of the whole is done.
+    pub fn set(&self, done: u64, total: u64) {
+        self.0.set_length(total);
+        self.0.set_position(done);
+    }
+
     /// Removes the bar.
     pub fn finish(&self) {
         self.0.finish_and_clear();
     }
 }
 
-impl Progress for Bar {
-    fn pixels(&self, done: u64, total: u64) {
-        self.0.set_length(total);
-        self.0.set_position(done);
+/// Tiles move the bar on by their pixels; its length is those of the image.
+impl TileSink for Bar {
+    fn tile(&self, _: &Tile, pixels: &[[f32; 3]]) {
+        self.0.inc(pixels.len() as u64);
     }
 }

@@ -12,8 +12,8 @@ use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend};
 use crate::framing::choose_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
-use crate::image::{Image, exr::SampleType, tone::auto_exposure};
-use crate::render::{Film, RenderStats, render};
+use crate::image::{exr::SampleType, tone::auto_exposure};
+use crate::render::{RenderStats, Session, StopToken};
 use crate::scene::load::{LoadedScene, OpenedScene};
 use crate::settings::Settings;
 
@@ -99,30 +99,33 @@ fn render_to(
     })?;
     seconds.view = stage.elapsed().as_secs_f64();
 
+    let mut session = Session::with_backend(scene, chosen.backend)
+        .map_err(|source| CommandError::Session { scene: args.scene.path.clone(), source })?;
     let bar = reporter.bar("rendering");
-    let rendered = render(&chosen.backend, &scene, camera, &settings, &bar);
-    let (film, stats) =
-        rendered.map_err(|source| CommandError::Mesh { scene: args.scene.path.clone(), source })?;
+    let (width, height) = settings.view.resolution;
+    bar.set(0, u64::from(width) * u64::from(height));
+    let rendered = session.render_to(camera, &settings, &bar, &StopToken::default());
+    let (image, stats) =
+        rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;
     bar.finish();
     seconds.paths = stats.seconds.paths;
     seconds.mesh = stats.seconds.mesh;
     seconds.shade = stats.seconds.shade;
 
     let stage = Instant::now();
-    let Film { resolution: (width, height), pixels } = film;
     if bare && args.overrides.exposure.is_none() {
-        settings.exposure = auto_exposure(&pixels);
-        reporter.line(&format!("note: exposure {:+} stops", settings.exposure));
+        settings.output.exposure = auto_exposure(image.pixels());
+        reporter.line(&format!("note: exposure {:+} stops", settings.output.exposure));
     }
-    let image = Image::from_pixels(width, height, pixels)?;
     let non_finite_pixels = image.non_finite_pixels();
     if non_finite_pixels > 0 {
         reporter.line(&format!("warning: {non_finite_pixels} pixels are not finite"));
     }
+    let (scene, backend) = (session.scene(), session.backend());
     let options = ImageOptions {
         sample_type: if args.float { SampleType::Float } else { SampleType::Half },
-        exposure: settings.exposure,
-        metadata: metadata(&chosen.backend, &settings, &stats),
+        exposure: settings.output.exposure,
+        metadata: metadata(backend, &settings, &stats),
     };
     for target in targets {
         target.write(&image, &options)?;
@@ -132,18 +135,18 @@ fn render_to(
 
     let stats_file = StatsFile {
         version: env!("CARGO_PKG_VERSION"),
-        backend: BackendStats { name: chosen.backend.name(), version: chosen.backend.version() },
+        backend: BackendStats { name: backend.name(), version: backend.version() },
         triangles: scene.triangle_count(),
         unique_triangles: scene.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
         lights: scene.lights.len(),
         resolution: [width, height],
-        samples_per_pixel: settings.samples_per_pixel,
+        samples_per_pixel: settings.view.samples_per_pixel,
         threads: rayon::current_num_threads(),
         seconds,
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,
-        acceleration_bytes: chosen.backend.memory_bytes(),
+        acceleration_bytes: backend.memory_bytes(),
         peak_rss_bytes: peak_rss_bytes(),
         non_finite_pixels,
     };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::choice::one_of;
+use super::choice::named;
 use super::error::CommandError;
 use super::progress::Reporter;
 use crate::accel::{BackendChoice, check_memory, parse_size};
@@ -80,7 +80,7 @@ impl ThreadArgs {
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct BackendArgs {
     /// Library that traces the rays
-    #[arg(long, default_value_t, value_parser = one_of(&BackendChoice::NAMES))]
+    #[arg(long, default_value_t, value_parser = named::<BackendChoice>())]
     pub backend: BackendChoice,
 }
 

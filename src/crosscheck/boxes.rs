@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 
 use super::local_ray::{BOUND, LocalRay};
-use crate::scene::Bounds;
+use crate::Bounds;
 
 /// Boxes per leaf.
 const LEAF: usize = 4;

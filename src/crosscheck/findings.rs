@@ -73,7 +73,7 @@ pub struct Checked {
     pub audited: u64,
     /// Largest difference of distances over what the bound allows, among hits of one triangle that were judged.
     pub worst: f64,
-    /// By subject.
+    /// Counts by subject.
     pub counts: Vec<Counts>,
     /// The first disagreements that nothing explains.
     pub unexplained: Vec<Unexplained>,
@@ -84,7 +84,7 @@ pub struct Checked {
 pub struct Unexplained {
     /// Whose answer is wrong.
     pub backend: String,
-    /// To which query.
+    /// The query that the answer belongs to.
     pub query: Query,
     /// The answer; `None` where a lane answered that was switched off.
     pub answer: Option<Answer>,

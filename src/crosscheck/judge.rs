@@ -11,8 +11,9 @@ use super::boxes::{BoxTree, Stack, Walker};
 use super::crossing::Crossing;
 use super::local_ray::LocalRay;
 use super::placement::Placement;
+use crate::Bounds;
 use crate::accel::{MAX_COORDINATE, is_valid_ray, largest_coordinate};
-use crate::scene::{Bounds, Hit, Ray, Scene, TriangleMesh};
+use crate::scene::{Hit, Ray, Scene, TriangleMesh};
 
 /// A triangle that a ray hits, or may be reported to hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,10 +58,10 @@ pub struct Truth {
 pub struct Judge<'a> {
     scene: &'a Scene,
     placements: Vec<Placement>,
-    /// By mesh.
+    /// Trees of triangles, by mesh.
     trees: Vec<BoxTree>,
     top: BoxTree,
-    /// Of the coordinates of rays.
+    /// Largest magnitude of the coordinates of rays that can hit anything.
     largest: f32,
 }
 

@@ -3,9 +3,10 @@
 use glam::{Vec2, Vec3};
 
 use super::queries::{GROUP, RayQueries};
-use crate::light_mesh::LightTable;
-use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, Camera, CameraRays, PointLight, Ray, Scene, SurfacePoint};
+use crate::Bounds;
+use crate::lights::PackedLights;
+use crate::sampling::SplitMix64;
+use crate::scene::{Camera, CameraRays, PointLight, Ray, Scene, SurfacePoint};
 
 macro_rules! kinds {
     ($($kind:ident $name:literal $what:literal,)*) => {
@@ -81,7 +82,7 @@ type Pixel = (usize, u32, u32);
 pub struct RaySource<'a> {
     scene: &'a Scene,
     cameras: Vec<CameraRays>,
-    lights: LightTable,
+    lights: PackedLights,
     bounds: Bounds,
     /// Triangles up to and with each instance.
     triangles: Vec<u64>,
@@ -108,9 +109,9 @@ impl<'a> RaySource<'a> {
             let lights: Vec<_> = (0..20)
                 .map(|_| PointLight::point(random.in_box(bounds.min, bounds.max), Vec3::ONE))
                 .collect();
-            LightTable::of_scene(&Scene { lights, ..Scene::default() })
+            PackedLights::of_scene(&Scene { lights, ..Scene::default() })
         } else {
-            LightTable::of_scene(scene)
+            PackedLights::of_scene(scene)
         };
         let cameras = cameras.iter().map(|camera| CameraRays::new(camera, RESOLUTION, SAMPLES)).collect();
         Self { scene, cameras, lights, bounds, triangles, tracer, seed }
@@ -189,9 +190,9 @@ impl<'a> RaySource<'a> {
             (0..16).map(|i| corner + spacing * Vec3::new((i % 4) as f32, 0.0, (i / 4) as f32)).collect()
         };
         for chunk in self.lights.chunks() {
-            for light in (0..crate::light_mesh::LANES).filter(|&light| chunk.used >> light & 1 != 0) {
+            for light in (0..crate::simd::LANES).filter(|&light| chunk.used >> light & 1 != 0) {
                 rays.extend(points.iter().map(|&point| {
-                    let way = Vec3::from_array(chunk.way_from(light, point.to_array()));
+                    let way = Vec3::from_array(chunk.to_light(light, point.to_array()));
                     Ray { t_far: 1.0, ..Ray::new(point, way) }
                 }));
             }

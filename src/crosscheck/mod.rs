@@ -23,14 +23,17 @@ use crate::scene::{Camera, Scene};
 use kinds::RaySource;
 use queries::BLOCK;
 
-pub use check::check_rays;
-pub use findings::{Checked, Class, Counts, Unexplained};
-pub use judge::{Judge, Truth};
+pub use findings::{Class, Counts, Unexplained};
+pub use judge::Truth;
 pub use queries::{Answer, Answers, Query, RayQueries, Subject};
-pub use ray_text::{RayTextError, from_text, to_text};
+pub use ray_text::{RayTextError, from_text};
 pub use replay::{Replay, replay};
 pub use report::{KindCounts, Report};
 pub use watertight::{Escapes, Watertightness, watertightness};
+
+// Only tests check rays of their own.
+#[doc(hidden)]
+pub use {check::check_rays, findings::Checked, judge::Judge};
 
 /// How much is checked.
 #[derive(Clone, Copy, Debug)]

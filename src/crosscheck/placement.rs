@@ -3,13 +3,14 @@
 use glam::{Affine3A, DMat3, DVec3};
 
 use super::local_ray::{BOUND, LocalRay};
+use crate::Bounds;
 use crate::accel::largest_coordinate_of;
-use crate::scene::{Bounds, Ray};
+use crate::scene::Ray;
 
 /// Where an instance's triangles are.
 #[derive(Clone, Debug)]
 pub enum Placement {
-    /// In world space.
+    /// The mesh is in world space already.
     World,
     /// Moved by a map that can be undone.
     Placed(Box<Inverse>),

@@ -69,7 +69,7 @@ impl Answer {
 /// The answers to a list of rays.
 #[derive(Default)]
 pub struct Answers {
-    /// In the order of the rays.
+    /// Answers in the order of the rays.
     pub answers: Vec<Answer>,
     /// First rays of packets in which a lane answered that was switched off.
     pub strays: Vec<usize>,
@@ -77,7 +77,7 @@ pub struct Answers {
 
 /// All queries of an [`Accel`], as an object whose type is not known at compile time.
 pub trait RayQueries: Send + Sync {
-    /// The answers to all rays, traced in [`packets`].
+    /// The answers to all rays, traced one by one or in packets.
     fn trace(&self, query: Query, group: usize, rays: &[Ray]) -> Answers;
     /// The closest hit of one ray.
     fn closest(&self, ray: &Ray) -> Option<Hit>;

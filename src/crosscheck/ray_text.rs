@@ -21,7 +21,7 @@ pub fn to_text(ray: &Ray) -> String {
     [o.x, o.y, o.z, d.x, d.y, d.z, ray.t_near, ray.t_far].map(|number| format!("{number:?}")).join(",")
 }
 
-/// The ray of a text that [`to_text`] wrote, or a person.
+/// The ray of a text of eight numbers with commas between: origin, direction, t_near, t_far.
 ///
 /// # Errors
 /// [`RayTextError`] for a text that isn't eight numbers.

@@ -18,7 +18,7 @@ pub struct KindCounts {
     pub rays: u64,
     /// Rays that were judged although all agreed.
     pub audited: u64,
-    /// By backend.
+    /// Counts by backend.
     pub counts: Vec<Counts>,
 }
 
@@ -31,7 +31,7 @@ pub struct Report {
     pub rays: u64,
     /// What the rays followed from.
     pub seed: u64,
-    /// By kind.
+    /// Counts by kind of ray.
     pub kinds: Vec<KindCounts>,
     /// Largest difference of distances over what the bound allows.
     pub worst: f64,

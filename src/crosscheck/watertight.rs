@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::queries::{BLOCK, GROUP, Query, RayQueries, Subject};
-use crate::scene::random::SplitMix64;
+use crate::sampling::SplitMix64;
 use crate::scene::{Ray, Scene};
 
 /// Of this many rays one may escape.
@@ -22,7 +22,7 @@ const AIMS: [&str; 3] = ["vertices", "edges", "anywhere"];
 /// Rays that escaped from inside a closed scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Watertightness {
-    /// By backend and aim.
+    /// Counts by backend and aim.
     pub rows: Vec<Escapes>,
 }
 

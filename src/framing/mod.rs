@@ -46,7 +46,7 @@ impl ChosenView {
 pub fn choose_view(opened: &OpenedScene, backend: &Backend) -> ChosenView {
     let OpenedScene { loaded, bare, .. } = opened;
     let lacks_lights = *bare && loaded.scene.lights.is_empty();
-    let (width, height) = loaded.settings.resolution;
+    let (width, height) = loaded.settings.view.resolution;
     let aspect = width as f32 / height as f32;
     let mut chosen = ChosenView::default();
     if loaded.cameras.is_empty() {

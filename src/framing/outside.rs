@@ -5,9 +5,10 @@ use std::f32::consts::TAU;
 use glam::{Quat, Vec2, Vec3};
 
 use super::probe::{Probe, Sight};
+use crate::Bounds;
 use crate::accel::Accel;
-use crate::light_mesh::SphereStrata;
-use crate::scene::{Bounds, Camera, CameraRays};
+use crate::sampling::SphereStrata;
+use crate::scene::{Camera, CameraRays};
 
 /// Vertical field of view, degrees.
 const FOV: f32 = 40.0;

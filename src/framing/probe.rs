@@ -2,10 +2,11 @@
 
 use glam::Vec3;
 
+use crate::Bounds;
 use crate::accel::Accel;
-use crate::light_mesh::SphereStrata;
-use crate::scene::random::SplitMix64;
-use crate::scene::{Bounds, Interaction, LightShape, Ray, Scene};
+use crate::sampling::SphereStrata;
+use crate::sampling::SplitMix64;
+use crate::scene::{Interaction, LightShape, Ray, Scene};
 
 /// A scene that rays can ask.
 pub struct Probe<'a, A> {

@@ -2,15 +2,16 @@
 
 use glam::Vec3;
 
-use super::lanes::{LANES, VisibilityBits};
-use super::neighbours::Neighbours;
-use super::points::MeshPoints;
+use super::points::Neighbours;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::lights::VisibilityBits;
 use crate::scene::{Ray, Scene, SurfacePoint};
+use crate::settings::Leaks;
+use crate::simd::LANES;
 
 /// Directions in which a mesh point looks for back faces: towards the faces and corners of a cube, turned so that
 /// none is parallel to axis-aligned walls.
-const PROBES: usize = 14;
+pub const PROBES: usize = 14;
 
 /// A point lies inside of something when more than this share of its probes end at the back of a one-sided surface. In
 /// the open even a crowd of single leaves shows about as many fronts as backs.
@@ -78,26 +79,70 @@ pub fn lights_differ<'a>(mut points: impl Iterator<Item = &'a [VisibilityBits]> 
     by_all * SHARED < by_any
 }
 
-/// Keeps those of the mesh points that a surface point sees; returns the number of rays. If it sees none, all stay.
-#[inline(never)]
-pub fn keep_visible<A: Accel>(
-    accel: &A,
-    mesh: &MeshPoints,
-    surface: &SurfacePoint,
-    points: &mut Neighbours,
-) -> u64 {
-    let origin = surface.ray_origin();
-    let rays = points.ids().len();
-    let mut blocked = Vec::with_capacity(rays);
-    for group in points.ids().chunks(LANES) {
-        let mut packet = RayPacket::<LANES>::empty();
-        for (lane, &id) in group.iter().enumerate() {
-            packet.set_lane(lane, &Ray::between(origin, mesh.position(id)));
+/// Decides which points of D_y count for a surface point, for light meshes and for the reference alike.
+pub struct LeakGuard<'a, A> {
+    /// Answers rays.
+    pub accel: &'a A,
+    /// The rule.
+    pub leaks: Leaks,
+    /// Positions of the points, by slot.
+    pub positions: &'a [Vec3],
+}
+
+/// What [`LeakGuard::keep_counting`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeakedPoints {
+    /// Rays traced.
+    pub rays: u64,
+    /// Whether no point counts, so that only the first was kept.
+    pub all_dropped: bool,
+}
+
+impl<A: Accel> LeakGuard<'_, A> {
+    /// Keeps those of the points that count; `inside` reports by slot which lie in geometry, `uncertain` whether points
+    /// differ so much that it matters which of them the surface point sees.
+    #[inline(always)]
+    pub fn keep_counting(
+        &self,
+        surface: &SurfacePoint,
+        points: &mut Neighbours,
+        inside: impl Fn(u32) -> bool,
+        uncertain: impl Fn(&[u32]) -> bool,
+    ) -> LeakedPoints {
+        let mut leaked = LeakedPoints::default();
+        match self.leaks {
+            Leaks::Allow => {}
+            Leaks::Invalidate => {
+                if points.slots().iter().any(|&slot| inside(slot)) && !points.keep(|_, slot| !inside(slot)) {
+                    points.keep_first();
+                    leaked.all_dropped = true;
+                }
+            }
+            Leaks::Visibility => {
+                if uncertain(points.slots()) {
+                    leaked.rays = self.keep_visible(surface, points);
+                }
+            }
         }
-        let active = ((1u64 << group.len()) - 1) as u32;
-        let lanes = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
-        blocked.extend((0..group.len()).map(|lane| lanes >> lane & 1 == 1));
+        leaked
     }
-    points.keep(|index, _| !blocked[index]);
-    rays as u64
+
+    /// Keeps those of the points that a surface point sees; returns the number of rays. If it sees none, all stay.
+    #[inline(never)]
+    fn keep_visible(&self, surface: &SurfacePoint, points: &mut Neighbours) -> u64 {
+        let origin = surface.ray_origin();
+        let rays = points.slots().len();
+        let mut blocked = Vec::with_capacity(rays);
+        for slots in points.slots().chunks(LANES) {
+            let mut packet = RayPacket::<LANES>::empty();
+            for (lane, &slot) in slots.iter().enumerate() {
+                packet.set_lane(lane, &Ray::between(origin, self.positions[slot as usize]));
+            }
+            let active = ((1u64 << slots.len()) - 1) as u32;
+            let lanes = self.accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
+            blocked.extend((0..slots.len()).map(|lane| lanes >> lane & 1 == 1));
+        }
+        points.keep(|index, _| !blocked[index]);
+        rays as u64
+    }
 }

@@ -1,34 +1,29 @@
-//! Light meshes: lazily evaluated values at mesh points in free space, interpolated at surfaces.
+//! Light meshes: lazily evaluated values at mesh points in free space, interpolated at surfaces (docs/method.md).
+//!
+//! The words, with what others call them:
+//!
+//! - *mesh point*: a position in free space at which light is known; elsewhere an irradiance probe.
+//! - *light mesh*: a set of mesh points with values; elsewhere a probe volume. *Direct*: what reaches a point from lights.
+//!   *Indirect*: what reaches it from surfaces.
+//! - *D_y*: the mesh points from which a surface point y takes its light; their weights are an interpolation *kernel* of
+//!   radius R.
+//! - *layer*: the mesh points of one layout and spacing. *Brick*: 64 points with consecutive ids.
+//! - *slot*: where the values of a known point lie in its mesh's arrays.
+//! - *estimator*: how direct illumination follows from the points of D_y.
+//!
+//! The rooms, each of which uses those above it only:
+//!
+//! | room | what |
+//! |---|---|
+//! | [`points`] | positions and ids, kernels, finding the points of D_y |
+//! | [`store`] | which points are known, and in which slot |
+//! | `leaks`, [`lookup`] | the known points of D_y that count for a surface point |
+//! | [`direct`] | visibility of lights at mesh points, and the estimators |
+//! | [`indirect`] | gathering, bounces, irradiance by normal |
 
-mod attenuation;
-mod direct;
-pub mod directional;
-mod emitters;
-mod estimator;
-mod ids;
-mod indirect;
-mod lanes;
-mod lattice;
-mod leaks;
-mod lights;
-mod neighbours;
-mod normal_table;
-mod patches;
-mod points;
-mod scattered;
-mod sphere;
-mod store;
-mod tiled;
-mod vicinity;
-
-pub use direct::{Basis, DirectValues};
-pub use estimator::{DirectMesh, Scratch};
-pub use indirect::{IndirectMesh, IndirectRays};
-pub use lanes::{LANES, Lanes, VisibilityBits, expand_bits};
-pub use lattice::Lattice;
-pub use leaks::is_inside;
-pub use lights::{LightChunk, LightTable};
-pub use neighbours::{Ball, Neighbours};
-pub use points::{MeshError, MeshPoints, PointCounters};
-pub use sphere::SphereStrata;
-pub use store::{NeededPoints, PointMask};
+pub mod direct;
+pub mod indirect;
+pub mod leaks;
+pub mod lookup;
+pub mod points;
+pub mod store;

@@ -1,10 +1,9 @@
 //! What a render did and how long it took.
 
-use std::time::Duration;
-
 use serde::Serialize;
 
-use crate::light_mesh::PointCounters;
+use crate::light_mesh::direct::DirectEvaluation;
+use crate::light_mesh::indirect::IndirectEvaluation;
 
 /// Wall-clock seconds per stage of rendering.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -28,6 +27,21 @@ pub struct RayCounters {
     pub shadow: u64,
     /// Rays that gather indirect light at mesh points.
     pub indirect: u64,
+    /// Rays that look whether mesh points lie inside of geometry.
+    pub inside: u64,
+}
+
+/// Counters of one light mesh in one render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PointCounters {
+    /// About how many points the neighbourhoods of surface points could reach.
+    pub total: u64,
+    /// Points that lay in the neighbourhood of some surface point, summed over image blocks.
+    pub needed: u64,
+    /// Points that got a value; never one that had a value before.
+    pub evaluated: u64,
+    /// Surface points whose neighbourhood was empty and fell back to the nearest point.
+    pub nearest_fallback: u64,
 }
 
 /// Counters of the light meshes.
@@ -48,11 +62,54 @@ pub struct RenderStats {
     pub rays: RayCounters,
     /// Mesh points.
     pub mesh_points: MeshCounters,
-    /// Bytes held by the light meshes.
+    /// Bytes held by the light meshes afterwards.
     pub light_mesh_bytes: u64,
 }
 
-/// Adds the time since `start` to a stage.
-pub(super) fn add_since(stage: &mut f64, start: std::time::Instant) {
-    *stage += Duration::as_secs_f64(&start.elapsed());
+/// What shading some surface points took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShadeCounters {
+    /// Occlusion rays from the surface points.
+    pub shadow_rays: u64,
+    /// Rays that look whether positions lie inside of geometry.
+    pub inside_rays: u64,
+    /// Surface points without direct mesh points in their neighbourhood.
+    pub direct_fallbacks: u64,
+    /// The same of indirect mesh points.
+    pub indirect_fallbacks: u64,
+}
+
+impl RenderStats {
+    /// Adds what the evaluation of direct mesh points took.
+    pub(super) fn add_direct(&mut self, evaluation: DirectEvaluation) {
+        self.mesh_points.direct.evaluated += evaluation.evaluated;
+        self.rays.shadow += evaluation.shadow;
+        self.rays.inside += evaluation.inside;
+    }
+
+    /// Adds what the evaluation of indirect mesh points took.
+    pub(super) fn add_indirect(&mut self, evaluation: IndirectEvaluation) {
+        self.mesh_points.indirect.evaluated += evaluation.evaluated;
+        self.mesh_points.direct.needed += evaluation.direct_needed;
+        self.rays.indirect += evaluation.rays;
+        self.rays.shadow += evaluation.shadow;
+        self.rays.inside += evaluation.inside;
+        self.add_direct(evaluation.direct);
+    }
+
+    /// Adds what shading counted.
+    pub(super) fn add_shading(&mut self, counters: ShadeCounters) {
+        self.rays.shadow += counters.shadow_rays;
+        self.rays.inside += counters.inside_rays;
+        self.mesh_points.direct.nearest_fallback += counters.direct_fallbacks;
+        self.mesh_points.indirect.nearest_fallback += counters.indirect_fallbacks;
+    }
+}
+
+/// Runs a stage and adds its time.
+pub(super) fn timed<T>(seconds: &mut f64, stage: impl FnOnce() -> T) -> T {
+    let start = std::time::Instant::now();
+    let result = stage();
+    *seconds += start.elapsed().as_secs_f64();
+    result
 }

@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 
-use super::paths::PathVertex;
+use super::trace::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::light_mesh::{LANES, LightChunk, LightTable, VisibilityBits, expand_bits};
+use crate::lights::{LightChunk, PackedLights, VisibilityBits, expand_bits};
+use crate::simd::LANES;
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for
 /// neighbouring points.
@@ -44,7 +45,7 @@ impl SurfaceGroup {
         let Self { packet, normals, .. } = self;
         let mut facing: LaneMask = 0;
         for lane in 0..LANES {
-            let d = chunk.way_from(light, [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]]);
+            let d = chunk.to_light(light, [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]]);
             let cosine = normals[0][lane] * d[0] + normals[1][lane] * d[1] + normals[2][lane] * d[2];
             let side = normals[3][lane] * d[0] + normals[4][lane] * d[1] + normals[5][lane] * d[2];
             packet.dir_x[lane] = d[0];
@@ -66,7 +67,7 @@ impl SurfaceGroup {
 /// I of each vertex from the lights whose bits are set, a row of bits per vertex.
 #[inline(always)]
 pub(super) fn light_of_seen(
-    lights: &LightTable,
+    lights: &PackedLights,
     vertices: &[PathVertex],
     seen: &[VisibilityBits],
     light: &mut [Vec3],
@@ -75,6 +76,6 @@ pub(super) fn light_of_seen(
     for (number, (vertex, light)) in vertices.iter().zip(light).enumerate() {
         let bits = &seen[number * chunks..][..chunks];
         *light =
-            lights.illuminate(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk])));
+            lights.irradiance(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk])));
     }
 }

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec2, Vec3};
 
+use crate::Bounds;
+
 /// Vertex positions in object space, shared with the acceleration structure without a copy.
 ///
 /// The buffer ends in one vertex of padding, since Embree reads four bytes past the last position.
@@ -93,6 +95,13 @@ impl TriangleMesh {
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         let positions = self.positions.as_slice();
         self.triangles[triangle as usize].map(|i| Vec3::from_array(positions[i as usize]))
+    }
+
+    /// Box around the vertices in object space.
+    pub fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        self.positions.as_slice().iter().for_each(|&position| bounds.extend(position.into()));
+        bounds
     }
 
     /// Texture coordinates of a triangle at barycentric (u, v); 0 where the mesh has none.

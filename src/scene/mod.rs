@@ -1,7 +1,6 @@
 //! The scene: what is rendered. Immutable once loaded.
 
 mod alpha_mask;
-mod bounds;
 mod camera;
 mod camera_rays;
 pub mod generate;
@@ -9,7 +8,6 @@ mod light;
 pub mod load;
 mod material;
 mod mesh;
-pub mod random;
 mod ray;
 mod surface;
 mod texture;
@@ -19,8 +17,9 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 
+use crate::Bounds;
+
 pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
-pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
 pub use camera_rays::CameraRays;
 pub use light::{Falloff, LightShape, PointLight};
@@ -85,5 +84,23 @@ impl Scene {
     /// Places a mesh once more.
     pub fn place(&mut self, mesh: u32, to_world: Affine3A) {
         self.instances.push(Instance { mesh, to_world: Some(to_world) });
+    }
+
+    /// Box around all triangles in world space.
+    pub fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for instance in &self.instances {
+            let mesh = &self.meshes[instance.mesh as usize];
+            for &[x, y, z] in mesh.positions.as_slice() {
+                let p = Vec3::new(x, y, z);
+                bounds.extend(instance.to_world.map_or(p, |m| m.transform_point3(p)));
+            }
+        }
+        bounds
+    }
+
+    /// Number of triangles with instances counted each time they are placed.
+    pub fn triangle_count(&self) -> u64 {
+        self.instances.iter().map(|i| self.meshes[i.mesh as usize].triangles.len() as u64).sum()
     }
 }

@@ -104,6 +104,16 @@ pub struct BadValue {
 /// How far the length of a direction may be from 1.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
+impl PointLight {
+    /// Whether light can be computed from the light; `index` is its place in the scene, for the message.
+    ///
+    /// # Errors
+    /// [`SceneError::Light`].
+    pub fn validate(&self, index: usize) -> Result<(), SceneError> {
+        validate_light(self).map_err(|value| SceneError::Light { index, value })
+    }
+}
+
 impl Scene {
     /// Whether the scene can be rendered: all indices exist, arrays are as long as they must be, and lights, colours and
     /// masks are finite and not negative.
@@ -121,7 +131,7 @@ impl Scene {
             validate_material(material).map_err(error)?;
         }
         for (index, light) in self.lights.iter().enumerate() {
-            validate_light(light).map_err(|value| SceneError::Light { index, value })?;
+            light.validate(index)?;
         }
         if let Falloff::Linear { constant } = self.falloff {
             not_negative("falloff constant", constant).map_err(SceneError::Value)?;

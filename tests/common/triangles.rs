@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3};
-use lightmesh::scene::random::SplitMix64;
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{
     AlphaMask, Instance, Material, Positions, Scene, Texture, TextureMap, TriangleMaterials, TriangleMesh,
     Wrap,

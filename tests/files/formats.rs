@@ -6,8 +6,8 @@ use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::choose_view;
 use lightmesh::render::{Film, render};
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::load::open_scene;
-use lightmesh::scene::random::SplitMix64;
 
 use crate::common::bits;
 use crate::common::soup::Soup;

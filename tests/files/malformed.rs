@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::load::obj::{ChunkSizes, read_obj};
 use lightmesh::scene::load::{LoadError, Model, load_model, load_scene_file};
-use lightmesh::scene::random::SplitMix64;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 

@@ -4,9 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use glam::Vec3;
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::load::obj::{ChunkSizes, load_obj, read_obj};
 use lightmesh::scene::load::{LoadError, Model};
-use lightmesh::scene::random::SplitMix64;
 use lightmesh::scene::{TriangleMaterials, TriangleMesh};
 
 fn try_read(text: impl AsRef<[u8]>) -> Result<Model, LoadError> {

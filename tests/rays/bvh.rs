@@ -7,9 +7,8 @@
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
-use lightmesh::accel::bvh::{BvhError, SimdLevel};
 use lightmesh::accel::{
-    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, PacketLanes, RayHitPacket, RayPacket,
+    Accel, BruteForceAccel, BvhAccel, BvhError, Coherence, PacketLanes, RayHitPacket, RayPacket, SimdLevel,
     hit_of_lane,
 };
 use lightmesh::scene::{Hit, Ray, Scene, TriangleMaterials, TriangleMesh};
@@ -484,7 +483,7 @@ fn an_instance_of_a_mesh_that_does_not_exist_is_an_error() {
 }
 
 #[test]
-fn geometry_and_instance_ids_tell_instanced_from_plain_geometry() {
+fn hits_name_their_instance_whether_it_is_placed_or_not() {
     let shape = sphere(4, 1.0);
     let away = Affine3A::from_translation(10.0 * Vec3::X);
     let accel = BvhAccel::build(&scene(vec![shape], vec![(0, Some(away)), (0, None)])).unwrap();
@@ -492,6 +491,6 @@ fn geometry_and_instance_ids_tell_instanced_from_plain_geometry() {
     packet.set_lane(0, &Ray::new(Vec3::new(0.1, 0.2, 0.1), Vec3::Y));
     packet.set_lane(1, &Ray::new(Vec3::new(10.1, 0.2, 0.1), Vec3::Y));
     accel.intersect_packet(0b11, &mut packet, Coherence::Coherent);
-    assert_eq!((packet.hit.geom_id[0], packet.hit.inst_id[0]), (1, INVALID_ID));
-    assert_eq!((packet.hit.geom_id[1], packet.hit.inst_id[1]), (0, 0));
+    let instances = [0, 1].map(|lane| hit_of_lane(&packet, lane).map(|hit| hit.instance));
+    assert_eq!(instances, [Some(1), Some(0)]);
 }

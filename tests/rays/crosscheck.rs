@@ -4,9 +4,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Affine3A, Vec3};
-use lightmesh::accel::{
-    Accel, BruteForceAccel, BvhAccel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket,
-};
+use lightmesh::accel::{Accel, BruteForceAccel, BvhAccel, Coherence, LaneMask, RayHitPacket, RayPacket};
 use lightmesh::crosscheck::{
     Checked, Counts, Judge, Options, Subject, check_rays, crosscheck, watertightness,
 };
@@ -48,39 +46,8 @@ impl<F: Fn(&Ray, Option<Hit>) -> Option<Hit> + Send + Sync> Accel for Bent<F> {
         self.intersect(ray).is_some()
     }
 
-    fn intersect_packet<const N: usize>(&self, active: LaneMask, packet: &mut RayHitPacket<N>, _: Coherence) {
-        for lane in (0..N).filter(|lane| active >> lane & 1 != 0) {
-            let Some(hit) = self.intersect(&ray_of(&packet.ray, lane)) else { continue };
-            packet.ray.tfar[lane] = hit.t;
-            packet.hit.u[lane] = hit.u;
-            packet.hit.v[lane] = hit.v;
-            packet.hit.prim_id[lane] = hit.triangle;
-            packet.hit.geom_id[lane] = hit.instance;
-            packet.hit.inst_id[lane] = INVALID_ID;
-        }
-    }
-
-    fn occluded_packet<const N: usize>(
-        &self,
-        active: LaneMask,
-        packet: &mut RayPacket<N>,
-        _: Coherence,
-    ) -> LaneMask {
-        let lanes = (0..N).filter(|lane| active >> lane & 1 != 0);
-        lanes.filter(|&lane| self.occluded(&ray_of(packet, lane))).map(|lane| 1 << lane).sum()
-    }
-
     fn memory_bytes(&self) -> usize {
         self.accel.memory_bytes()
-    }
-}
-
-fn ray_of<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {
-    Ray {
-        origin: Vec3::new(packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]),
-        direction: Vec3::new(packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]),
-        t_near: packet.tnear[lane],
-        t_far: packet.tfar[lane],
     }
 }
 

@@ -213,7 +213,9 @@ fn nine_hundred_small_geometries_are_found() {
     for i in 0..900u32 {
         let above = Vec3::new(2.0 * i as f32 + 0.25, 0.25, 1.0);
         let hit = embree.intersect(&Ray::new(above, Vec3::NEG_Z)).expect("the geometry is there");
-        assert_eq!((hit.instance, hit.triangle, hit.t, hit.u, hit.v), (i, 0, 1.0, 0.25, 0.25));
+        // Embree's reciprocals are approximate in the last bit on some processors.
+        let expected = Hit { t: 1.0, u: 0.25, v: 0.25, instance: i, triangle: 0 };
+        assert!(same(Some(hit), Some(expected)), "{hit:?}");
         assert!(!embree.occluded(&Ray::new(above + Vec3::X, Vec3::NEG_Z)));
     }
 }
@@ -251,7 +253,8 @@ fn damaged_triangles_leave_the_others_as_they_are() {
         let scene = scene(vec![damaged.clone()], vec![(0, Some(singular)), (0, to_world)]);
         let Some(embree) = embree(&scene) else { return };
         let hit = embree.intersect(&Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z)).expect("triangle 0");
-        assert_eq!((hit.instance, hit.triangle, hit.t), (1, 0, 1.0));
+        let expected = Hit { t: 1.0, u: 0.2, v: 0.2, instance: 1, triangle: 0 };
+        assert!(same(Some(hit), Some(expected)), "{hit:?}");
     }
 }
 

@@ -9,7 +9,7 @@ use lightmesh::accel::{
     RayHitPacket, hit_of_lane,
 };
 use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
-use lightmesh::scene::random::SplitMix64;
+use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{Ray, Scene, TriangleMaterials, TriangleMesh};
 
 use crate::common::triangles::{HOLES, Random, mesh, scene, soup};

@@ -56,7 +56,7 @@ impl Device {
         // SAFETY: the string ends in a zero byte and is copied.
         let handle = unsafe { call!(api, rtcNewDevice(configuration.as_ptr())) };
         if handle.is_null() {
-            // SAFETY: a null device asks for the error of the failed creation.
+            // SAFETY: a null device stands for the error of the failed creation.
             return Err(creation_error(unsafe { call!(api, rtcGetDeviceError(ptr::null_mut())) }));
         }
         let device = Self(Arc::new(Inner { handle, library: library.clone(), state: Box::default() }));

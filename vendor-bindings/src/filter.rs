@@ -15,7 +15,7 @@ use crate::bindings::{RTCGeometry, embree3 as v3, embree4 as v4};
 use crate::device::Device;
 use crate::library::{Api, call};
 
-/// Tells whether triangle `prim_id` is opaque at barycentric (u, v). Called from many threads at once.
+/// Whether triangle `prim_id` is opaque at barycentric (u, v). Called from many threads at once.
 pub type Opacity = Arc<dyn Fn(u32, f32, f32) -> bool + Send + Sync>;
 
 /// What the callbacks get as user data.

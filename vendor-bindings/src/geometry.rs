@@ -1,4 +1,4 @@
-//! Geometries: triangles over shared buffers, and instances of scenes.
+//! Geometries: handles and what they keep alive, and triangles over shared buffers.
 
 use std::{mem::size_of, sync::Arc};
 
@@ -8,8 +8,6 @@ use crate::error::Error;
 use crate::filter::{Filter, Opacity};
 use crate::library::call;
 use crate::packet::MAX_COORDINATE;
-use crate::placement::largest_coordinate;
-use crate::scene::Scene;
 
 /// A geometry, ready to be attached to a scene.
 pub struct Geometry {
@@ -17,14 +15,9 @@ pub struct Geometry {
     device: Device,
     instance: bool,
     largest_coordinate: f32,
-    // Held for Embree, which has their addresses; dropped after the handle.
-    _buffers: Option<Buffers>,
-    _filter: Option<Box<Filter>>,
-    _instanced: Option<Scene>,
+    // What Embree has the addresses or handles of; dropped after `Geometry::drop` released the geometry.
+    held: Vec<Box<dyn Send + Sync>>,
 }
-
-/// Shared vertices and triangles.
-struct Buffers(#[expect(dead_code)] Arc<Vec<[f32; 3]>>, #[expect(dead_code)] Arc<Vec<[u32; 3]>>);
 
 // SAFETY: a geometry may be used and released on any thread; its methods take no `&self` that writes.
 unsafe impl Send for Geometry {}
@@ -35,7 +28,7 @@ impl Geometry {
     /// Triangles over shared buffers, which are not copied.
     ///
     /// `vertices` ends in one vertex of padding, which no triangle may name: Embree reads four bytes
-    /// past the last position. With `opacity`, a triangle is only hit where that says so.
+    /// past the last position. With `opacity`, a triangle is only hit where that returns true.
     /// Triangles with coordinates that are not finite, or beyond ±1.8·10¹⁸, are never hit.
     ///
     /// # Errors
@@ -61,7 +54,7 @@ impl Geometry {
 
         let mut geometry = Self::new(device, v4::RTC_GEOMETRY_TYPE_TRIANGLE)?;
         let (handle, api) = (geometry.handle, device.api());
-        // SAFETY: the pointers stay valid, and what they point at unchanged, since `_buffers` shares the
+        // SAFETY: the pointers stay valid, and what they point at unchanged, since `held` shares the
         // ownership; formats, strides and counts are those of the vectors, with the padding behind.
         unsafe {
             call!(
@@ -91,48 +84,12 @@ impl Geometry {
                 )
             );
         }
-        geometry._buffers = Some(Buffers(vertices, triangles));
+        geometry.held.push(Box::new((vertices, triangles)));
         device.check("share vertices and triangles")?;
         if let Some(opacity) = opacity {
-            geometry._filter = Some(Filter::register(device, handle, opacity));
+            geometry.held.push(Filter::register(device, handle, opacity));
             device.check("set the opacity filter")?;
         }
-        geometry.commit()
-    }
-
-    /// A placed scene. `to_world` holds the columns of the affine map from the scene's space to that
-    /// of the scene to which the instance is attached: three axes, then the origin.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NestedInstance`] where the scene itself holds instances, [`Error::Transform`] for a map
-    /// that has no inverse or scales by less than about 10⁻⁹, and [`Error::Embree`].
-    pub fn instance(scene: &Scene, to_world: [[f32; 3]; 4]) -> Result<Self, Error> {
-        if scene.has_instances() {
-            return Err(Error::NestedInstance);
-        }
-        let largest = largest_coordinate(&to_world).ok_or(Error::Transform)?;
-        let to_world = without_tiny(to_world);
-        let device = scene.device();
-        let mut geometry = Self::new(device, v4::RTC_GEOMETRY_TYPE_INSTANCE)?;
-        geometry.instance = true;
-        geometry.largest_coordinate = largest;
-        let handle = geometry.handle;
-        // SAFETY: both handles are valid and of one device; the matrix is copied.
-        unsafe {
-            call!(device.api(), rtcSetGeometryInstancedScene(handle, scene.handle()));
-            call!(
-                device.api(),
-                rtcSetGeometryTransform(
-                    handle,
-                    0,
-                    v4::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
-                    to_world.as_ptr().cast()
-                )
-            );
-        }
-        geometry._instanced = Some(scene.clone());
-        device.check("place an instance")?;
         geometry.commit()
     }
 
@@ -145,13 +102,24 @@ impl Geometry {
             device: device.clone(),
             instance: false,
             largest_coordinate: MAX_COORDINATE,
-            _buffers: None,
-            _filter: None,
-            _instanced: None,
+            held: Vec::new(),
         })
     }
 
-    fn commit(self) -> Result<Self, Error> {
+    /// An instance before its scene and placement are set. `largest_coordinate` is that of rays that can be brought into
+    /// its space; `scene` is kept as long as the geometry.
+    pub(crate) fn new_instance(
+        device: &Device,
+        largest_coordinate: f32,
+        scene: Box<dyn Send + Sync>,
+    ) -> Result<Self, Error> {
+        let mut geometry = Self::new(device, v4::RTC_GEOMETRY_TYPE_INSTANCE)?;
+        (geometry.instance, geometry.largest_coordinate) = (true, largest_coordinate);
+        geometry.held = vec![scene];
+        Ok(geometry)
+    }
+
+    pub(crate) fn commit(self) -> Result<Self, Error> {
         // SAFETY: the geometry is valid. Version 4's default mask has one bit only; version 3's has all.
         unsafe {
             call!(self.device.api(), rtcSetGeometryMask(self.handle, u32::MAX));
@@ -184,19 +152,4 @@ impl Drop for Geometry {
         // own reference first (see `scene::Inner`).
         unsafe { call!(self.device.api(), rtcReleaseGeometry(self.handle)) }
     }
-}
-
-/// Entries below this part of the largest one of their column become 0.
-const TINY: f32 = f32::EPSILON;
-
-/// The map without the remains of rounding that turns by quaternions leave where there should be 0, such as 10⁻¹⁷:
-/// they make components of directions tiny, and [Embree's packets lose hits](crate::query) over those.
-///
-/// That moves a point by no more than rounding does, by a few 10⁻⁷ of its distance from the instance's own origin.
-fn without_tiny([x, y, z, origin]: [[f32; 3]; 4]) -> [[f32; 3]; 4] {
-    let [x, y, z] = [x, y, z].map(|axis| {
-        let limit = TINY * axis.iter().fold(0.0f32, |largest, entry| largest.max(entry.abs()));
-        axis.map(|entry| if entry.abs() < limit { 0.0 } else { entry })
-    });
-    [x, y, z, origin]
 }

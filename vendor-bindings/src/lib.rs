@@ -35,6 +35,8 @@ mod filter;
 #[cfg(feature = "runtime")]
 mod geometry;
 #[cfg(feature = "runtime")]
+mod instance;
+#[cfg(feature = "runtime")]
 mod layout;
 #[cfg(feature = "runtime")]
 mod library;

@@ -93,7 +93,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// [`Error::CannotLoad`], [`Error::NotEmbree`], [`Error::UnsupportedVersion`], or what Embree says
+    /// [`Error::CannotLoad`], [`Error::NotEmbree`], [`Error::UnsupportedVersion`], or what Embree reports
     /// where it cannot run on this processor.
     pub fn open(name: &OsStr) -> Result<Self, Error> {
         let display = name.to_string_lossy().into_owned();
@@ -146,7 +146,7 @@ impl std::fmt::Debug for Library {
     }
 }
 
-/// Asks the library for its version, which takes a device. The functions used have had these
+/// Queries the library's version, which takes a device. The functions used have had these
 /// signatures since version 3.0; in version 2 one of them is missing.
 fn version_of(
     library: &libloading::Library,
@@ -168,7 +168,7 @@ fn version_of(
     // SAFETY: a null configuration stands for the defaults.
     let device = unsafe { new(ptr::null()) };
     if device.is_null() {
-        // SAFETY: a null device asks for the error of the failed creation.
+        // SAFETY: a null device stands for the error of the failed creation.
         return Err(creation_error(unsafe { error(ptr::null_mut()) }));
     }
     // A property that is no u32 is no version either, and refused as such.

@@ -55,7 +55,7 @@ pub struct RayPacket<const N: usize> {
     pub dir_z: [f32; N],
     /// Time for motion blur; unused, 0.
     pub time: [f32; N],
-    /// End of the valid interval of t. A nearest-hit query lowers it to the hit; an occlusion query
+    /// End of the valid interval of t. A closest-hit query lowers it to the hit; an occlusion query
     /// sets it to −∞ where the ray is blocked.
     pub tfar: [f32; N],
     /// Ray masks, −1 (all bits): Embree 4 compares them with the geometry's mask.

@@ -30,7 +30,7 @@ impl Ray {
     }
 }
 
-/// Nearest hit of a single ray.
+/// Closest hit of a single ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Ray parameter.
@@ -51,7 +51,7 @@ pub struct Hit {
 ///
 /// Embree's boxes take what is below 10⁻¹⁸ for 0, its packets' frusta don't, and lose hits over the difference. With
 /// [`MIN_DIRECTION`](crate::packet::MIN_DIRECTION) none is left; nor in the space of an instance, whose map [has no tiny entries
-/// either](crate::geometry).
+/// either](crate::instance).
 const TINY: f32 = 1e-8;
 
 #[inline(always)]
@@ -171,7 +171,7 @@ fn raw_ray(ray: &Ray) -> v4::RTCRay {
 }
 
 impl Scene {
-    /// Nearest hit of one ray.
+    /// Closest hit of one ray.
     #[inline]
     pub fn intersect1(&self, ray: &Ray) -> Option<Hit> {
         if !ray.is_valid(self.largest_coordinate()) {
@@ -232,7 +232,7 @@ impl Scene {
         r.tfar == f32::NEG_INFINITY
     }
 
-    /// Nearest hits of the lanes whose bit is set in `active`; `N` is 4, 8 or 16.
+    /// Closest hits of the lanes whose bit is set in `active`; `N` is 4, 8 or 16.
     ///
     /// Lanes that hit get `ray.tfar` and `hit` filled; all others stay as they are, so `geom_id` and
     /// `inst_id` should come as [`INVALID_ID`]. `coherent` is a hint for rays with neighbouring origins

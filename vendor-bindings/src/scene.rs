@@ -156,6 +156,11 @@ impl Scene {
         self.0.largest_coordinate
     }
 
+    /// Bytes of the handles to the scene's geometries, which [`Device::memory_bytes`] doesn't count.
+    pub fn handle_bytes(&self) -> usize {
+        self.0.geometries.len() * size_of::<(u32, Geometry)>()
+    }
+
     /// The device that the scene belongs to.
     pub fn device(&self) -> &Device {
         &self.0.device

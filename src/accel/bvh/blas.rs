@@ -5,7 +5,7 @@ use crate::scene::MaskedMesh;
 use super::lanes::{Lanes, map3};
 use super::node::{TriangleBlock, WIDTH, WideTree};
 use super::ray::SingleRay;
-use super::traverse::{any_hit, nearest_hit};
+use super::traverse::{any_hit, closest_hit};
 use super::triangle::{EdgeTest, LaneHit, test_edges};
 
 /// Triangles of one or several meshes under one tree, numbered in the order of the meshes.
@@ -28,15 +28,15 @@ pub struct Part {
     pub masked: Option<MaskedMesh>,
 }
 
-/// Nearest hit so far, within one tree.
+/// Closest hit so far, within one tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Nearest {
+pub struct Closest {
     pub hit: LaneHit,
     /// Number of the triangle within the tree, `u32::MAX` for none.
     pub id: u32,
 }
 
-impl Nearest {
+impl Closest {
     /// No hit before `t_far`.
     #[inline(always)]
     pub fn none(t_far: f32) -> Self {
@@ -55,15 +55,16 @@ impl Nearest {
 }
 
 impl Blas {
+    /// Bytes of the tree and what it holds, without itself.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
+            + self.blocks.capacity() * size_of::<TriangleBlock>()
+            + self.parts.capacity() * size_of::<Part>()
+    }
+
     /// Instance and triangle within its mesh of a triangle of this tree.
     pub fn resolve(&self, id: u32) -> (u32, u32) {
         self.part(id).map_or((0, id), |part| (part.instance, id - part.first))
-    }
-
-    /// Whether the tree holds triangles of this instance.
-    #[inline(always)]
-    pub fn has_instance(&self, instance: u32) -> bool {
-        self.parts.binary_search_by_key(&instance, |part| part.instance).is_ok()
     }
 
     fn part(&self, id: u32) -> Option<&Part> {
@@ -99,11 +100,11 @@ impl Blas {
         )
     }
 
-    /// Nearest hit of the ray.
+    /// Closest hit of the ray.
     #[inline(always)]
-    pub fn intersect<S: Lanes<WIDTH>, const STACK: usize>(&self, simd: S, ray: &SingleRay) -> Nearest {
-        let mut nearest = Nearest::none(ray.t_far);
-        nearest_hit(
+    pub fn intersect<S: Lanes<WIDTH>, const STACK: usize>(&self, simd: S, ray: &SingleRay) -> Closest {
+        let mut closest = Closest::none(ray.t_far);
+        closest_hit(
             &self.tree,
             simd,
             ray,
@@ -112,11 +113,11 @@ impl Blas {
             ray.t_far,
             #[inline(always)]
             |leaf| {
-                self.intersect_block(simd, &self.blocks[leaf], ray, &mut nearest);
-                nearest.hit.t
+                self.intersect_block(simd, &self.blocks[leaf], ray, &mut closest);
+                closest.hit.t
             },
         );
-        nearest
+        closest
     }
 
     #[inline(always)]
@@ -173,11 +174,7 @@ impl Blas {
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
-            let hit = if distances.undecided >> lane & 1 != 0 {
-                edges.exact(simd, lane, shear_z, t_near, t_far)
-            } else {
-                Some(distances.hit(lane))
-            };
+            let hit = edges.decide(simd, &distances, lane, shear_z, [t_near, t_far]);
             if hit.is_some_and(|hit| self.is_opaque(block.ids[lane], &hit)) {
                 return true;
             }
@@ -185,14 +182,14 @@ impl Blas {
         false
     }
 
-    /// Lowers `nearest` to the nearest hit among a block's triangles.
+    /// Lowers `closest` to the closest hit among a block's triangles.
     #[inline(always)]
     pub fn intersect_block<S: Lanes<WIDTH>>(
         &self,
         simd: S,
         block: &TriangleBlock,
         ray: &SingleRay,
-        nearest: &mut Nearest,
+        closest: &mut Closest,
     ) -> bool {
         let edges = Self::test_block(simd, block, ray);
         let candidates = edges.candidates & block.used();
@@ -205,7 +202,7 @@ impl Blas {
             candidates,
             simd.splat(shear_z),
             simd.splat(t_near),
-            simd.splat(nearest.hit.t),
+            simd.splat(closest.hit.t),
         );
         let mut changed = false;
         let mut hits = distances.hits | distances.undecided;
@@ -213,8 +210,8 @@ impl Blas {
             let lane = hits.trailing_zeros() as usize & 7;
             hits &= hits - 1;
             let hit = if distances.undecided >> lane & 1 != 0 {
-                edges.exact(simd, lane, shear_z, t_near, nearest.hit.t)
-            } else if distances.t[lane] <= nearest.hit.t {
+                edges.exact(simd, lane, shear_z, t_near, closest.hit.t)
+            } else if distances.t[lane] <= closest.hit.t {
                 Some(distances.hit(lane))
             } else {
                 None
@@ -222,7 +219,7 @@ impl Blas {
             if let Some(hit) = hit
                 && self.is_opaque(block.ids[lane], &hit)
             {
-                changed |= nearest.offer(hit, block.ids[lane]);
+                changed |= closest.offer(hit, block.ids[lane]);
             }
         }
         changed

@@ -2,12 +2,12 @@
 
 use crate::accel::LaneMask;
 
-use super::blas::{Blas, Nearest};
+use super::blas::{Blas, Closest};
 use super::lanes::{Lanes, map3};
 use super::node::{TriangleBlock, WIDTH};
 use super::packet::{Group, PacketRays};
-use super::traverse::{any_hit, nearest_hit};
-use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
+use super::traverse::{any_hit, closest_hit};
+use super::traverse_packet::{Visit, any_hit_packet, closest_hit_packet};
 use super::triangle::{Distances, EdgeTest, LaneHit, test_edges};
 
 impl Blas {
@@ -56,23 +56,23 @@ impl Blas {
         blocked
     }
 
-    /// Nearest hits of a packet: lowers `t_far` and sets `nearest` of lanes that hit.
+    /// Closest hits of a packet: lowers `t_far` and sets `closest` of lanes that hit.
     #[inline(always)]
     pub fn intersect_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK: usize>(
         &self,
         (wide, narrow): (K, S),
         rays: &mut PacketRays<W>,
         active: LaneMask,
-        nearest: &mut [Nearest; W],
+        closest: &mut [Closest; W],
     ) {
-        let mut found = NearestLanes { u: [0.0; W], v: [0.0; W], ids: [u32::MAX; W] };
+        let mut found = ClosestLanes { u: [0.0; W], v: [0.0; W], ids: [u32::MAX; W] };
         let mut remaining = active & rays.active;
         let mut stack = [0; STACK];
         let mut group_stack = [(0, 0, 0.0); STACK];
         while remaining != 0 {
             let group = rays.group_of(remaining.trailing_zeros() as usize, remaining);
             remaining &= !group.lanes;
-            nearest_hit_packet::<K, S, W, STACK>(
+            closest_hit_packet::<K, S, W, STACK>(
                 &self.tree,
                 (wide, narrow),
                 rays,
@@ -81,7 +81,7 @@ impl Blas {
                 #[inline(always)]
                 |visit, rays| match visit {
                     Visit::Leaf(leaf, lanes) => {
-                        self.leaf_nearest(
+                        self.leaf_closest(
                             (wide, narrow),
                             rays,
                             &group,
@@ -93,7 +93,7 @@ impl Blas {
                     Visit::Alone(start, lane) => {
                         let ray = rays.single(&group, lane);
                         let mut best = found.lane(lane, ray.t_far);
-                        nearest_hit(
+                        closest_hit(
                             &self.tree,
                             narrow,
                             &ray,
@@ -111,8 +111,8 @@ impl Blas {
                 },
             );
         }
-        for (lane, nearest) in nearest.iter_mut().enumerate() {
-            *nearest = found.lane(lane, rays.t_far[lane]);
+        for (lane, closest) in closest.iter_mut().enumerate() {
+            *closest = found.lane(lane, rays.t_far[lane]);
         }
     }
 
@@ -153,11 +153,8 @@ impl Blas {
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % W;
                 hits &= hits - 1;
-                let hit = if distances.undecided >> lane & 1 != 0 {
-                    edges.exact(wide, lane, group.shear[2][lane], rays.t_near[lane], rays.t_far[lane])
-                } else {
-                    Some(distances.hit(lane))
-                };
+                let interval = [rays.t_near[lane], rays.t_far[lane]];
+                let hit = edges.decide(wide, &distances, lane, group.shear[2][lane], interval);
                 if hit.is_some_and(|hit| self.is_opaque(block.ids[triangle], &hit)) {
                     blocked |= 1 << lane;
                 }
@@ -167,14 +164,14 @@ impl Blas {
     }
 
     #[inline(always)]
-    fn leaf_nearest<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
+    fn leaf_closest<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize>(
         &self,
         (wide, narrow): (K, S),
         rays: &mut PacketRays<W>,
         group: &Group<W>,
         block: &TriangleBlock,
         lanes: LaneMask,
-        found: &mut NearestLanes<W>,
+        found: &mut ClosestLanes<W>,
     ) {
         let used = block.used();
         if lanes.count_ones() <= used.count_ones() {
@@ -207,11 +204,8 @@ impl Blas {
             while hits != 0 {
                 let lane = hits.trailing_zeros() as usize % W;
                 hits &= hits - 1;
-                let hit = if distances.undecided >> lane & 1 != 0 {
-                    edges.exact(wide, lane, group.shear[2][lane], rays.t_near[lane], rays.t_far[lane])
-                } else {
-                    Some(distances.hit(lane))
-                };
+                let interval = [rays.t_near[lane], rays.t_far[lane]];
+                let hit = edges.decide(wide, &distances, lane, group.shear[2][lane], interval);
                 let mut best = found.lane(lane, rays.t_far[lane]);
                 if let Some(hit) = hit
                     && self.is_opaque(id, &hit)
@@ -224,28 +218,28 @@ impl Blas {
     }
 }
 
-/// Nearest hits of a packet, whose distances are the rays' `t_far`.
-struct NearestLanes<const W: usize> {
+/// Closest hits of a packet, whose distances are the rays' `t_far`.
+struct ClosestLanes<const W: usize> {
     u: [f32; W],
     v: [f32; W],
     ids: [u32; W],
 }
 
-impl<const W: usize> NearestLanes<W> {
+impl<const W: usize> ClosestLanes<W> {
     #[inline(always)]
-    fn lane(&self, lane: usize, t_far: f32) -> Nearest {
+    fn lane(&self, lane: usize, t_far: f32) -> Closest {
         let lane = lane % W;
-        Nearest { hit: LaneHit { t: t_far, u: self.u[lane], v: self.v[lane] }, id: self.ids[lane] }
+        Closest { hit: LaneHit { t: t_far, u: self.u[lane], v: self.v[lane] }, id: self.ids[lane] }
     }
 
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, nearest: &Nearest, rays: &mut PacketRays<W>) {
+    fn set_lane(&mut self, lane: usize, closest: &Closest, rays: &mut PacketRays<W>) {
         let lane = lane % W;
-        rays.t_far[lane] = nearest.hit.t;
-        (self.u[lane], self.v[lane], self.ids[lane]) = (nearest.hit.u, nearest.hit.v, nearest.id);
+        rays.t_far[lane] = closest.hit.t;
+        (self.u[lane], self.v[lane], self.ids[lane]) = (closest.hit.u, closest.hit.v, closest.id);
     }
 
-    /// [`Nearest::offer`] for all lanes that one triangle hits; without branches, so that it vectorises.
+    /// [`Closest::offer`] for all lanes that one triangle hits; without branches, so that it vectorises.
     #[inline(always)]
     fn offer_all(&mut self, distances: &Distances<W>, id: u32, rays: &mut PacketRays<W>) {
         for lane in 0..W {

@@ -93,7 +93,7 @@ pub struct BinaryNode {
     /// Number of nodes of the right subtree, 0 for a leaf.
     pub right_size: u32,
     /// The cheapest way to stand for this subtree by at most i + 1 children of a wide node. Entry 0
-    /// is 1 for a leaf block and 0 for a node of its own; the others tell how many of the children go
+    /// is 1 for a leaf block and 0 for a node of its own; the others are how many of the children go
     /// to the left subtree, 0 for one child less.
     pub split: [u8; WIDTH],
 }

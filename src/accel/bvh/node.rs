@@ -111,3 +111,10 @@ pub struct WideTree {
     /// Most entries that a traversal stack needs at any time.
     pub stack_bound: usize,
 }
+
+impl WideTree {
+    /// Bytes of the nodes.
+    pub fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+    }
+}

@@ -1,76 +1,19 @@
 //! The queries, dispatched to an instruction set once per ray or packet.
 
-use pulp::NullaryFnOnce;
 #[cfg(target_arch = "x86_64")]
-use pulp::x86::{V3, V4};
+use pulp::{NullaryFnOnce, x86::V4};
 
-use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, RayHitPacket, RayPacket};
-
-use super::lanes::{Lanes, Portable};
-use super::node::WIDTH;
-use super::packet::{PacketRays, RawRays};
-use super::{BvhAccel, SimdLevel};
+use crate::accel::packet::set_hit_of_lane;
+use crate::accel::{Accel, Coherence, LaneMask, RayHitPacket, RayPacket};
 use crate::scene::{Hit, Ray};
 
-/// Proof that the processor has what the chosen level needs.
-#[derive(Clone, Copy)]
-pub enum Dispatch {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2(V3),
-    #[cfg(target_arch = "x86_64")]
-    Avx512(V4),
-}
-
-impl Dispatch {
-    /// The proof, if the processor has the level.
-    pub fn new(level: SimdLevel) -> Option<Self> {
-        match level {
-            SimdLevel::Portable => Some(Self::Portable),
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 => V3::try_new().map(Self::Avx2),
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx512 => V4::try_new().map(Self::Avx512),
-            #[cfg(not(target_arch = "x86_64"))]
-            SimdLevel::Avx2 | SimdLevel::Avx512 => None,
-        }
-    }
-}
-
-impl Dispatch {
-    /// Runs a task on the level, compiled for it.
-    #[inline(always)]
-    fn run<T: Task>(self, task: T) -> T::Output {
-        match self {
-            Self::Portable => task.run(Portable),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(simd) => simd.vectorize(OnLevel { simd, task }),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(simd) => simd.vectorize(OnLevel { simd, task }),
-        }
-    }
-}
-
-/// A query that can be compiled for any level.
-trait Task {
-    type Output;
-    fn run<S: Lanes<WIDTH>>(self, simd: S) -> Self::Output;
-}
-
-/// A task bound to a level.
-struct OnLevel<S, T> {
-    simd: S,
-    task: T,
-}
-
-impl<S: Lanes<WIDTH>, T: Task> NullaryFnOnce for OnLevel<S, T> {
-    type Output = T::Output;
-
-    #[inline(always)]
-    fn call(self) -> T::Output {
-        self.task.run(self.simd)
-    }
-}
+use super::lanes::Lanes;
+use super::level::Task;
+#[cfg(target_arch = "x86_64")]
+use super::level::{Dispatch, OnLevel};
+use super::node::WIDTH;
+use super::packet::{PacketRays, RawRays};
+use super::structure::BvhAccel;
 
 struct SingleAny<'a>(&'a BvhAccel, &'a Ray);
 
@@ -83,9 +26,9 @@ impl Task for SingleAny<'_> {
     }
 }
 
-struct SingleNearest<'a>(&'a BvhAccel, &'a Ray);
+struct SingleClosest<'a>(&'a BvhAccel, &'a Ray);
 
-impl Task for SingleNearest<'_> {
+impl Task for SingleClosest<'_> {
     type Output = Option<Hit>;
 
     #[inline(always)]
@@ -105,9 +48,9 @@ impl Task for PacketAny<'_, WIDTH> {
     }
 }
 
-struct PacketNearest<'a, const W: usize>(&'a BvhAccel, &'a RawRays<W>);
+struct PacketClosest<'a, const W: usize>(&'a BvhAccel, &'a RawRays<W>);
 
-impl Task for PacketNearest<'_, WIDTH> {
+impl Task for PacketClosest<'_, WIDTH> {
     type Output = [Option<Hit>; WIDTH];
 
     #[inline(always)]
@@ -129,12 +72,12 @@ impl NullaryFnOnce for OnLevel<V4, PacketAny<'_, 16>> {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl NullaryFnOnce for OnLevel<V4, PacketNearest<'_, 16>> {
+impl NullaryFnOnce for OnLevel<V4, PacketClosest<'_, 16>> {
     type Output = [Option<Hit>; 16];
 
     #[inline(always)]
     fn call(self) -> [Option<Hit>; 16] {
-        let PacketNearest(accel, raw) = self.task;
+        let PacketClosest(accel, raw) = self.task;
         accel.intersect_lanes((self.simd, self.simd), &mut PacketRays::new(raw))
     }
 }
@@ -179,7 +122,7 @@ impl BvhAccel {
     }
 
     fn intersect_narrow(&self, raw: &RawRays<WIDTH>) -> [Option<Hit>; WIDTH] {
-        self.dispatch.run(PacketNearest(self, raw))
+        self.dispatch.run(PacketClosest(self, raw))
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -189,28 +132,22 @@ impl BvhAccel {
 
     #[cfg(target_arch = "x86_64")]
     fn intersect_wide(&self, simd: V4, raw: &RawRays<16>) -> [Option<Hit>; 16] {
-        simd.vectorize(OnLevel { simd, task: PacketNearest(self, raw) })
+        simd.vectorize(OnLevel { simd, task: PacketClosest(self, raw) })
     }
+}
 
-    fn write_hits<const N: usize>(&self, hits: &[Option<Hit>], first: usize, packet: &mut RayHitPacket<N>) {
-        for (lane, hit) in hits.iter().enumerate() {
-            let Some(hit) = hit else { continue };
-            let lane = first + lane;
-            packet.ray.tfar[lane] = hit.t;
-            packet.hit.u[lane] = hit.u;
-            packet.hit.v[lane] = hit.v;
-            packet.hit.prim_id[lane] = hit.triangle;
-            // Instances under the top level fill the instance id, others the geometry id.
-            let fixed = self.fixed.has_instance(hit.instance);
-            packet.hit.geom_id[lane] = if fixed { hit.instance } else { 0 };
-            packet.hit.inst_id[lane] = if fixed { INVALID_ID } else { hit.instance };
+/// Writes the hits of lanes `first..` of a packet.
+fn write_hits<const N: usize>(hits: &[Option<Hit>], first: usize, packet: &mut RayHitPacket<N>) {
+    for (lane, hit) in hits.iter().enumerate() {
+        if let Some(hit) = hit {
+            set_hit_of_lane(packet, first + lane, hit);
         }
     }
 }
 
 impl Accel for BvhAccel {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(SingleNearest(self, ray))
+        self.dispatch.run(SingleClosest(self, ray))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
@@ -222,11 +159,11 @@ impl Accel for BvhAccel {
         #[cfg(target_arch = "x86_64")]
         if let (Dispatch::Avx512(simd), 16) = (self.dispatch, N) {
             let hits = self.intersect_wide(simd, &lanes_of(&packet.ray, 0, active));
-            return self.write_hits(&hits, 0, packet);
+            return write_hits(&hits, 0, packet);
         }
         for first in (0..N).step_by(WIDTH) {
             let hits = self.intersect_narrow(&lanes_of(&packet.ray, first, active));
-            self.write_hits(&hits, first, packet);
+            write_hits(&hits, first, packet);
         }
     }
 

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use crate::accel::MAX_COORDINATE;
 use crate::scene::{AlphaMasks, Scene, TriangleMesh};
 
-use super::BvhError;
 use super::blas::{Blas, Part};
 use super::build::Primitive;
 use super::collapse::build_wide;
+use super::error::BvhError;
 use super::instance::{WorldToObject, world_bounds};
 use super::node::{LEAF, TriangleBlock, WIDTH, WideTree};
 

@@ -4,19 +4,16 @@ use pulp::NullaryFnOnce;
 
 use crate::accel::{LaneMask, is_valid_ray};
 
-use super::BvhAccel;
-use super::blas::{Blas, Nearest};
+use super::blas::{Blas, Closest};
 use super::lanes::Lanes;
 use super::node::WIDTH;
 use super::packet::{PacketRays, RawRays, lane_of};
 use super::ray::SingleRay;
 use super::scene_tree::Placed;
-use super::traverse::{any_hit, nearest_hit};
-use super::traverse_packet::{Visit, any_hit_packet, nearest_hit_packet};
+use super::structure::BvhAccel;
+use super::traverse::{STACK, any_hit, closest_hit};
+use super::traverse_packet::{Visit, any_hit_packet, closest_hit_packet};
 use crate::scene::{Hit, Ray};
-
-/// Entries of a traversal stack.
-pub const STACK: usize = 160;
 
 /// A ray through the tree of one instance. These tasks are functions of their own, which keeps the code for
 /// instances out of the loops of scenes that have none.
@@ -35,17 +32,17 @@ impl<S: Lanes<WIDTH>> NullaryFnOnce for SingleAny<'_, S> {
     }
 }
 
-struct SingleNearest<'a, S> {
+struct SingleClosest<'a, S> {
     simd: S,
     blas: &'a Blas,
     ray: &'a SingleRay,
 }
 
-impl<S: Lanes<WIDTH>> NullaryFnOnce for SingleNearest<'_, S> {
-    type Output = Nearest;
+impl<S: Lanes<WIDTH>> NullaryFnOnce for SingleClosest<'_, S> {
+    type Output = Closest;
 
     #[inline(always)]
-    fn call(self) -> Nearest {
+    fn call(self) -> Closest {
         self.blas.intersect::<S, STACK>(self.simd, self.ray)
     }
 }
@@ -68,7 +65,7 @@ impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketAny<'
     }
 }
 
-struct PacketNearest<'a, K, S, const W: usize> {
+struct PacketClosest<'a, K, S, const W: usize> {
     simd: (K, S),
     blas: &'a Blas,
     placed: &'a Placed,
@@ -76,16 +73,16 @@ struct PacketNearest<'a, K, S, const W: usize> {
     lanes: LaneMask,
 }
 
-impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketNearest<'_, K, S, W> {
-    type Output = [Nearest; W];
+impl<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize> NullaryFnOnce for PacketClosest<'_, K, S, W> {
+    type Output = [Closest; W];
 
     #[inline(always)]
-    fn call(self) -> [Nearest; W] {
+    fn call(self) -> [Closest; W] {
         let mut local = transformed(self.rays, self.placed, self.lanes);
-        let mut nearest = no_hits(&local.t_far);
+        let mut closest = no_hits(&local.t_far);
         let active = local.active;
-        self.blas.intersect_packet::<K, S, W, STACK>(self.simd, &mut local, active, &mut nearest);
-        nearest
+        self.blas.intersect_packet::<K, S, W, STACK>(self.simd, &mut local, active, &mut closest);
+        closest
     }
 }
 
@@ -93,14 +90,14 @@ impl BvhAccel {
     #[inline(always)]
     pub(super) fn intersect_with<S: Lanes<WIDTH>>(&self, simd: S, ray: &Ray) -> Option<Hit> {
         let single = SingleRay::new(ray).filter(|_| is_valid_ray(ray, self.largest))?;
-        let nearest = self.fixed.intersect::<S, STACK>(simd, &single);
+        let closest = self.fixed.intersect::<S, STACK>(simd, &single);
         let mut best = None;
-        self.offer_fixed(&nearest, &mut best);
+        self.offer_fixed(&closest, &mut best);
         if self.instances.placed.is_empty() {
             return best;
         }
         let t_far = best.map_or(ray.t_far, |hit| hit.t);
-        nearest_hit(
+        closest_hit(
             &self.instances.tree,
             simd,
             &single,
@@ -123,15 +120,15 @@ impl BvhAccel {
         let Some(placed) = self.instances.placed.get(number as usize) else { return };
         let t_far = best.map_or(ray.t_far, |hit| hit.t);
         let Some(ray) = SingleRay::new(&Ray { t_far, ..placed.to_object.ray(ray) }) else { return };
-        let nearest =
-            simd.vectorize(SingleNearest { simd, blas: &self.instances.trees[placed.tree], ray: &ray });
-        offer_placed(&nearest, placed.instance, best);
+        let closest =
+            simd.vectorize(SingleClosest { simd, blas: &self.instances.trees[placed.tree], ray: &ray });
+        offer_placed(&closest, placed.instance, best);
     }
 
-    fn offer_fixed(&self, nearest: &Nearest, best: &mut Option<Hit>) {
-        if nearest.id != u32::MAX {
-            let (instance, triangle) = self.fixed.resolve(nearest.id);
-            offer(best, nearest, instance, triangle);
+    fn offer_fixed(&self, closest: &Closest, best: &mut Option<Hit>) {
+        if closest.id != u32::MAX {
+            let (instance, triangle) = self.fixed.resolve(closest.id);
+            offer(best, closest, instance, triangle);
         }
     }
 
@@ -217,10 +214,10 @@ impl BvhAccel {
         rays: &mut PacketRays<W>,
     ) -> [Option<Hit>; W] {
         let mut found = [None; W];
-        let mut nearest = no_hits(&rays.t_far);
-        self.fixed.intersect_packet::<K, S, W, STACK>(simd, rays, rays.active, &mut nearest);
-        for (nearest, best) in nearest.iter().zip(&mut found) {
-            self.offer_fixed(nearest, best);
+        let mut closest = no_hits(&rays.t_far);
+        self.fixed.intersect_packet::<K, S, W, STACK>(simd, rays, rays.active, &mut closest);
+        for (closest, best) in closest.iter().zip(&mut found) {
+            self.offer_fixed(closest, best);
         }
         if self.instances.placed.is_empty() {
             return found;
@@ -236,16 +233,16 @@ impl BvhAccel {
                 for &number in &self.instances.leaves[leaf] {
                     let Some(placed) = self.instances.placed.get(number as usize) else { break };
                     let blas = &self.instances.trees[placed.tree];
-                    let nearest = simd.0.vectorize(PacketNearest { simd, blas, placed, rays, lanes });
-                    for (lane, nearest) in nearest.iter().enumerate() {
-                        offer_placed(nearest, placed.instance, &mut hits[lane]);
+                    let closest = simd.0.vectorize(PacketClosest { simd, blas, placed, rays, lanes });
+                    for (lane, closest) in closest.iter().enumerate() {
+                        offer_placed(closest, placed.instance, &mut hits[lane]);
                         if let Some(hit) = hits[lane] {
                             rays.t_far[lane] = hit.t;
                         }
                     }
                 }
             };
-            nearest_hit_packet::<K, S, W, STACK>(
+            closest_hit_packet::<K, S, W, STACK>(
                 &self.instances.tree,
                 simd,
                 rays,
@@ -257,7 +254,7 @@ impl BvhAccel {
                     Visit::Alone(start, lane) => {
                         let ray = rays.single(&group, lane);
                         let t_far = ray.t_far;
-                        nearest_hit(&self.instances.tree, simd.1, &ray, start, &mut stack, t_far, |leaf| {
+                        closest_hit(&self.instances.tree, simd.1, &ray, start, &mut stack, t_far, |leaf| {
                             visit_leaf(leaf, 1 << lane, rays);
                             rays.t_far[lane % W]
                         });
@@ -270,12 +267,12 @@ impl BvhAccel {
 }
 
 #[inline(always)]
-fn no_hits<const W: usize>(t_far: &[f32; W]) -> [Nearest; W] {
-    let mut nearest = [Nearest::none(0.0); W];
-    for (nearest, &t_far) in nearest.iter_mut().zip(t_far) {
-        *nearest = Nearest::none(t_far);
+fn no_hits<const W: usize>(t_far: &[f32; W]) -> [Closest; W] {
+    let mut closest = [Closest::none(0.0); W];
+    for (closest, &t_far) in closest.iter_mut().zip(t_far) {
+        *closest = Closest::none(t_far);
     }
-    nearest
+    closest
 }
 
 /// The rays `lanes` in the object space of an instance.
@@ -293,19 +290,19 @@ fn transformed<const W: usize>(rays: &PacketRays<W>, placed: &Placed, lanes: Lan
     PacketRays::new(&RawRays { origin, direction, t_near: rays.t_near, t_far: rays.t_far, active: lanes })
 }
 
-fn offer_placed(nearest: &Nearest, instance: u32, best: &mut Option<Hit>) {
-    if nearest.id != u32::MAX {
-        offer(best, nearest, instance, nearest.id);
+fn offer_placed(closest: &Closest, instance: u32, best: &mut Option<Hit>) {
+    if closest.id != u32::MAX {
+        offer(best, closest, instance, closest.id);
     }
 }
 
 /// Takes a hit that is nearer, or as near with a lower instance and triangle.
-fn offer(best: &mut Option<Hit>, nearest: &Nearest, instance: u32, triangle: u32) {
-    let t = nearest.hit.t;
+fn offer(best: &mut Option<Hit>, closest: &Closest, instance: u32, triangle: u32) {
+    let t = closest.hit.t;
     let better = best.is_none_or(|best| {
         t < best.t || (t == best.t && (instance, triangle) < (best.instance, best.triangle))
     });
     if better {
-        *best = Some(Hit { t, u: nearest.hit.u, v: nearest.hit.v, instance, triangle });
+        *best = Some(Hit { t, u: closest.hit.u, v: closest.hit.v, instance, triangle });
     }
 }

@@ -4,6 +4,9 @@ use super::lanes::Lanes;
 use super::node::{FAR_SCALE, LEAF, Node, WIDTH, WideTree};
 use super::ray::SingleRay;
 
+/// Entries of a traversal stack; no tree that is built needs more.
+pub const STACK: usize = 160;
+
 /// Walks the subtree `start` until `leaf` returns true; whether it did.
 #[inline(always)]
 pub fn any_hit<S: Lanes<WIDTH>, const STACK: usize>(
@@ -47,7 +50,7 @@ pub fn any_hit<S: Lanes<WIDTH>, const STACK: usize>(
 
 /// Walks the subtree `start` from near to far; `leaf` returns the new end of the ray's interval.
 #[inline(always)]
-pub fn nearest_hit<S: Lanes<WIDTH>, const STACK: usize>(
+pub fn closest_hit<S: Lanes<WIDTH>, const STACK: usize>(
     tree: &WideTree,
     simd: S,
     ray: &SingleRay,

@@ -101,7 +101,7 @@ pub fn any_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK:
 
 /// Walks the tree from near to far with all rays of a group; `visit` lowers the lanes' `t_far`.
 #[inline(always)]
-pub fn nearest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK: usize>(
+pub fn closest_hit_packet<K: Lanes<W>, S: Lanes<WIDTH>, const W: usize, const STACK: usize>(
     tree: &WideTree,
     (wide, narrow): (K, S),
     rays: &mut PacketRays<W>,

@@ -128,6 +128,24 @@ impl<F: Copy> EdgeTest<F> {
         }
     }
 
+    /// The hit of a lane that [`EdgeTest::distances`] found to hit, or left undecided: then of the test in double
+    /// precision, if that hits.
+    #[inline(always)]
+    pub fn decide<S: Lanes<W, F = F>, const W: usize>(
+        &self,
+        simd: S,
+        distances: &Distances<W>,
+        lane: usize,
+        shear_z: f32,
+        [t_near, t_far]: [f32; 2],
+    ) -> Option<LaneHit> {
+        if distances.undecided >> lane & 1 != 0 {
+            self.exact(simd, lane, shear_z, t_near, t_far)
+        } else {
+            Some(distances.hit(lane))
+        }
+    }
+
     /// The test of one lane in double precision.
     #[inline(always)]
     pub fn exact<S: Lanes<W, F = F>, const W: usize>(

@@ -1,16 +1,17 @@
 //! A walk over the finished trees that checks what traversal relies on.
 
-use super::BvhAccel;
 use super::blas::Blas;
 use super::collapse::padded;
 use super::node::{LEAF, NO_CHILD, WIDTH, WideTree};
+use super::structure::BvhAccel;
 
 type Box3 = [[f32; 3]; 2];
 
 impl BvhAccel {
     /// Checks the trees: every leaf and every node is referenced exactly once, every finite triangle is in
     /// exactly one leaf, children's boxes lie inside their parents', and hold what is below
-    /// them. The error says what is wrong.
+    /// them. The error names the place; for tests.
+    #[doc(hidden)]
     pub fn validate(&self) -> Result<(), String> {
         for blas in self.instances.trees.iter().chain([&self.fixed]) {
             validate_blas(blas)?;
@@ -37,6 +38,7 @@ impl BvhAccel {
     }
 
     /// A digest of all trees, equal for equal trees; for tests of the build's determinism.
+    #[doc(hidden)]
     pub fn digest(&self) -> u64 {
         use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
@@ -56,7 +58,8 @@ impl BvhAccel {
         hasher.finish()
     }
 
-    /// Number of triangles in the trees; those of an instanced mesh count once.
+    /// Number of triangles in the trees; those of an instanced mesh count once; for tests.
+    #[doc(hidden)]
     pub fn triangle_count(&self) -> usize {
         let blocks = self.instances.trees.iter().chain([&self.fixed]).flat_map(|blas| &blas.blocks);
         blocks.map(|block| block.used().count_ones() as usize).sum()

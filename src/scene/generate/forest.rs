@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::{GenerateError, write_files};
-use crate::scene::random::SplitMix64;
+use crate::sampling::SplitMix64;
 
 /// What to generate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
-use crate::scene::{Bounds, Falloff, LightShape, PointLight, Scene};
+use crate::Bounds;
+use crate::scene::{Falloff, LightShape, PointLight, Scene};
 use crate::settings::{Radius, Resolve, Settings, Spacing};
 
 /// What a file holds, and what was chosen for it.
@@ -45,11 +46,12 @@ impl OpenedScene {
             falloff: Falloff::InverseSquare,
             background: Vec3::ZERO,
         };
-        let mut settings = Settings { lambertian: true, ..Settings::default() };
+        let mut settings = Settings::default();
+        settings.shading.lambertian = true;
         let spacing = spacing(scene.bounds(), &scene.lights);
-        settings.light_mesh.points.spacing = Spacing::Units(Vec3::splat(spacing));
-        settings.light_mesh.points.radius = Radius::Spacings(2.0);
-        settings.light_mesh.resolve = Resolve::Trace;
+        settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+        settings.shading.kernel.radius = Radius::Spacings(2.0);
+        settings.shading.resolve = Resolve::Trace;
         let choices = vec![format!("mesh points every {spacing} units, shadow edges traced")];
         let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
         Self { loaded, choices, bare: true }

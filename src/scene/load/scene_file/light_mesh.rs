@@ -9,14 +9,16 @@ use super::place::Places;
 use super::points::{self, PointKeys};
 use super::values::{Count, NonNegative};
 use crate::scene::load::LoadError;
-use crate::settings::{Estimator, IndirectForm, IndirectSettings, LightMeshSettings, Normalization, Resolve};
+use crate::settings::{
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, Normalization, Resolve, Settings,
+};
 
 points::point_table! {
     /// `[light_mesh]`
     #[derive(Default)]
     pub struct LightMeshTable {
-        estimator: Option<EstimatorName>,
-        resolve: Option<ResolveName>,
+        estimator: Option<Estimator>,
+        resolve: Option<Resolve>,
         indirect: Option<IndirectTable>,
     }
 }
@@ -30,74 +32,26 @@ points::point_table! {
         bounces: Option<Count<1_000>>,
         tolerance: Option<NonNegative>,
         at_surface: Option<bool>,
-        form: Option<FormName>,
-        normalization: Option<NormalizationName>,
+        form: Option<IndirectForm>,
+        normalization: Option<Normalization>,
     }
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum EstimatorName {
-    Paper,
-    Ratio,
-    PerLight,
-    Directional,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum ResolveName {
-    Average,
-    Trace,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum FormName {
-    Scalar,
-    Directional,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum NormalizationName {
-    Mean,
-    Integral,
 }
 
 impl LightMeshTable {
     /// Puts what is given in place of the defaults; files lie in `folder`.
-    pub fn apply(
-        &self,
-        settings: &mut LightMeshSettings,
-        folder: &Path,
-        places: &Places,
-    ) -> Result<(), LoadError> {
-        self.point_keys("light_mesh").apply(&mut settings.points, folder, places)?;
-        if let Some(name) = self.estimator {
-            settings.estimator = match name {
-                EstimatorName::Paper => Estimator::Paper,
-                EstimatorName::Ratio => Estimator::Ratio,
-                EstimatorName::PerLight => Estimator::PerLight,
-                EstimatorName::Directional => Estimator::Directional,
-            };
-        }
-        if let Some(name) = self.resolve {
-            settings.resolve = match name {
-                ResolveName::Average => Resolve::Average,
-                ResolveName::Trace => Resolve::Trace,
-            };
-        }
-        // The indirect mesh's points follow from the direct one's unless its table says otherwise.
-        if let Some(indirect) = &mut settings.indirect {
-            indirect.points = IndirectSettings::coarser(&settings.points);
-        }
-        if let Some(table) = &self.indirect {
-            let indirect = settings.indirect.get_or_insert_with(|| IndirectSettings {
-                points: IndirectSettings::coarser(&settings.points),
-                ..Default::default()
-            });
-            table.apply(indirect, folder, places)?;
+    pub fn apply(&self, settings: &mut Settings, folder: &Path, places: &Places) -> Result<(), LoadError> {
+        let Settings { mesh, shading, .. } = settings;
+        self.point_keys("light_mesh").apply(&mut mesh.direct, &mut shading.kernel, folder, places)?;
+        shading.estimator = self.estimator.unwrap_or(shading.estimator);
+        shading.resolve = self.resolve.unwrap_or(shading.resolve);
+        // The indirect mesh's points and kernel follow from the direct one's unless its table says otherwise.
+        if mesh.indirect.is_some() || self.indirect.is_some() {
+            let indirect = mesh.indirect.get_or_insert_default();
+            indirect.points = IndirectSettings::coarser_points(&mesh.direct);
+            shading.indirect.kernel = IndirectSettings::wider_kernel(&shading.kernel);
+            if let Some(table) = &self.indirect {
+                table.apply(indirect, &mut shading.indirect, folder, places)?;
+            }
         }
         Ok(())
     }
@@ -107,27 +61,19 @@ impl IndirectTable {
     fn apply(
         &self,
         settings: &mut IndirectSettings,
+        shading: &mut IndirectShading,
         folder: &Path,
         places: &Places,
     ) -> Result<(), LoadError> {
-        self.point_keys("light_mesh.indirect").apply(&mut settings.points, folder, places)?;
+        let keys = self.point_keys("light_mesh.indirect");
+        keys.apply(&mut settings.points, &mut shading.kernel, folder, places)?;
         settings.directions = self.directions.map_or(settings.directions, |count| count.0);
         settings.emitter_samples = self.emitter_samples.map_or(settings.emitter_samples, |count| count.0);
         settings.bounces = self.bounces.map_or(settings.bounces, |count| count.0);
         settings.tolerance = self.tolerance.map_or(settings.tolerance, |share| share.0);
-        settings.at_surface = self.at_surface.unwrap_or(settings.at_surface);
-        if let Some(name) = self.form {
-            settings.form = match name {
-                FormName::Scalar => IndirectForm::Scalar,
-                FormName::Directional => IndirectForm::Directional,
-            };
-        }
-        if let Some(name) = self.normalization {
-            settings.normalization = match name {
-                NormalizationName::Mean => Normalization::Mean,
-                NormalizationName::Integral => Normalization::Integral,
-            };
-        }
+        settings.form = self.form.unwrap_or(settings.form);
+        shading.at_surface = self.at_surface.unwrap_or(shading.at_surface);
+        shading.normalization = self.normalization.unwrap_or(shading.normalization);
         Ok(())
     }
 }

@@ -6,9 +6,10 @@ use toml::Spanned;
 
 use super::place::Places;
 use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point};
+use crate::sampling::SplitMix64;
 use crate::scene::load::LoadError;
-use crate::scene::random::SplitMix64;
 use crate::scene::{Falloff, PointLight};
+use crate::settings::named_enum;
 
 /// Lights that one table may lay out.
 const MAX_LIGHTS: u32 = 1_000_000;
@@ -48,13 +49,16 @@ pub struct LightGridTable {
     total_intensity: Option<Color>,
 }
 
-/// `falloff`
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FalloffName {
-    Linear,
-    InverseSquare,
-    None,
+named_enum! {
+    /// `falloff`
+    pub enum FalloffName {
+        /// c + t, the paper's
+        Linear = "linear",
+        /// t²
+        InverseSquare = "inverse-square",
+        /// 1
+        None = "none",
+    }
 }
 
 /// φ1: `default` unless `falloff` or its constant are given; `None` where the two do not go together.

@@ -18,10 +18,12 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
+pub use self::lights::FalloffName;
+
 use self::camera::CameraTable;
 use self::geometry::{GeometryTable, MaterialTable};
 use self::light_mesh::LightMeshTable;
-use self::lights::{FalloffName, LightBoxTable, LightGridTable, LightTable};
+use self::lights::{LightBoxTable, LightGridTable, LightTable};
 use self::place::Places;
 use self::render::{PresetName, RenderTable};
 use self::values::{Color, NonNegative};
@@ -106,7 +108,7 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
         preset.apply(&mut settings, &mut falloff);
     }
     table.render.apply(&mut settings, &places)?;
-    table.light_mesh.apply(&mut settings.light_mesh, folder, &places)?;
+    table.light_mesh.apply(&mut settings, folder, &places)?;
 
     let mut gathered = Gathered::default();
     if let Some(camera) = &table.camera {

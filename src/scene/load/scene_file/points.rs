@@ -8,9 +8,11 @@ use toml::Spanned;
 
 use super::place::Places;
 use super::values::{Lengths, LengthsOrAuto, Point, Positive};
-use crate::scene::Bounds;
+use crate::Bounds;
 use crate::scene::load::{LoadError, load_points};
-use crate::settings::{Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing};
+use crate::settings::{
+    KernelSettings, LayoutName, Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing,
+};
 
 /// Defines a table that has the point keys beside its own. (serde can't flatten a struct into one that
 /// refuses unknown keys.)
@@ -21,15 +23,15 @@ macro_rules! point_table {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($field: $type,)*
-            layout: Option<$crate::scene::load::scene_file::points::LayoutName>,
+            layout: Option<$crate::settings::LayoutName>,
             layout_seed: Option<Spanned<u32>>,
             points_file: Option<Spanned<std::path::PathBuf>>,
             spacing: Option<$crate::scene::load::scene_file::values::LengthsOrAuto>,
             radius: Option<Spanned<$crate::scene::load::scene_file::values::Positive>>,
             radius_in_spacings: Option<$crate::scene::load::scene_file::values::Positive>,
-            neighbourhood: Option<$crate::scene::load::scene_file::points::NeighbourhoodName>,
+            neighbourhood: Option<$crate::settings::Neighbourhood>,
             hemisphere: Option<bool>,
-            leaks: Option<$crate::scene::load::scene_file::points::LeaksName>,
+            leaks: Option<$crate::settings::Leaks>,
             #[serde(default)]
             region: Vec<Spanned<$crate::scene::load::scene_file::points::RegionTable>>,
         }
@@ -65,38 +67,10 @@ pub struct PointKeys<'a> {
     pub spacing: Option<LengthsOrAuto>,
     pub radius: Option<&'a Spanned<Positive>>,
     pub radius_in_spacings: Option<Positive>,
-    pub neighbourhood: Option<NeighbourhoodName>,
+    pub neighbourhood: Option<Neighbourhood>,
     pub hemisphere: Option<bool>,
-    pub leaks: Option<LeaksName>,
+    pub leaks: Option<Leaks>,
     pub region: &'a [Spanned<RegionTable>],
-}
-
-/// `layout`
-#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LayoutName {
-    Regular,
-    BodyCentred,
-    Jittered,
-    BlueNoise,
-}
-
-/// `neighbourhood`
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum NeighbourhoodName {
-    Nearest,
-    Sphere,
-    SmoothSphere,
-}
-
-/// `leaks`
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LeaksName {
-    Allow,
-    Invalidate,
-    Visibility,
 }
 
 /// `[[light_mesh.region]]`
@@ -110,10 +84,11 @@ pub struct RegionTable {
 }
 
 impl PointKeys<'_> {
-    /// Puts what is given in place of what `settings` holds; files lie in `folder`.
+    /// Puts what is given in place of what `settings` and `kernel` hold; files lie in `folder`.
     pub fn apply(
         &self,
         settings: &mut PointSettings,
+        kernel: &mut KernelSettings,
         folder: &Path,
         places: &Places,
     ) -> Result<(), LoadError> {
@@ -125,28 +100,16 @@ impl PointKeys<'_> {
         }
         match (self.radius, self.radius_in_spacings) {
             (None, None) => {}
-            (Some(radius), None) => settings.radius = Radius::Units(radius.get_ref().0),
-            (None, Some(radius)) => settings.radius = Radius::Spacings(radius.0),
+            (Some(radius), None) => kernel.radius = Radius::Units(radius.get_ref().0),
+            (None, Some(radius)) => kernel.radius = Radius::Spacings(radius.0),
             (Some(radius), Some(_)) => {
                 let problem = "radius and radius_in_spacings exclude each other";
                 return Err(places.error(&radius.span(), &self.key("radius"), problem));
             }
         }
-        if let Some(name) = self.neighbourhood {
-            settings.neighbourhood = match name {
-                NeighbourhoodName::Nearest => Neighbourhood::Nearest,
-                NeighbourhoodName::Sphere => Neighbourhood::Sphere,
-                NeighbourhoodName::SmoothSphere => Neighbourhood::SmoothSphere,
-            };
-        }
-        settings.hemisphere = self.hemisphere.unwrap_or(settings.hemisphere);
-        if let Some(name) = self.leaks {
-            settings.leaks = match name {
-                LeaksName::Allow => Leaks::Allow,
-                LeaksName::Invalidate => Leaks::Invalidate,
-                LeaksName::Visibility => Leaks::Visibility,
-            };
-        }
+        kernel.neighbourhood = self.neighbourhood.unwrap_or(kernel.neighbourhood);
+        kernel.hemisphere = self.hemisphere.unwrap_or(kernel.hemisphere);
+        kernel.leaks = self.leaks.unwrap_or(kernel.leaks);
         if !self.region.is_empty() {
             let regions = self.region.iter().enumerate();
             settings.regions = regions
@@ -178,12 +141,7 @@ impl PointKeys<'_> {
         }
         let seed = u64::from(self.layout_seed.map_or(0, |seed| *seed.get_ref()));
         if let Some(name) = self.layout {
-            settings.layout = match name {
-                LayoutName::Regular => PointLayout::Regular,
-                LayoutName::BodyCentred => PointLayout::BodyCentred,
-                LayoutName::Jittered => PointLayout::Jittered { seed },
-                LayoutName::BlueNoise => PointLayout::BlueNoise { seed },
-            };
+            settings.layout = PointLayout::of_name(name, seed);
         }
         if let Some(seed) = self.layout_seed
             && !matches!(self.layout, Some(LayoutName::Jittered | LayoutName::BlueNoise))

@@ -1,0 +1,112 @@
+//! Direct illumination of surface points from known points of a direct field: the estimators of method §4, for light meshes
+//! and for the reference alike.
+
+use glam::{Vec3, Vec4};
+
+use super::derived::Basis;
+use super::field::DirectField;
+use super::spherical_harmonics;
+use crate::light_mesh::leaks::{amounts_differ, lights_differ};
+use crate::light_mesh::points::Neighbours;
+use crate::lights::{PackedLights, VisibilityBits};
+use crate::scene::SurfacePoint;
+use crate::settings::Estimator;
+use crate::simd::{LANES, Lanes};
+
+/// An estimator with what it reads: a field, whose values its [`Basis`] needs must be derived, and the lights that it is of.
+#[derive(Clone, Copy)]
+pub struct FieldEstimator<'a> {
+    /// The field.
+    pub field: &'a DirectField,
+    /// The lights.
+    pub lights: &'a PackedLights,
+    /// How direct illumination follows from them.
+    pub estimator: Estimator,
+}
+
+impl FieldEstimator<'_> {
+    /// Whether the points of D_y differ so much that a wall may stand between them.
+    #[inline(always)]
+    pub fn uncertain(&self, slots: &[u32]) -> bool {
+        match Basis::of(self.estimator) {
+            Basis::Bits => {
+                let chunks = self.lights.chunks().len();
+                lights_differ(slots.iter().map(|&slot| self.field.bits(slot, chunks)))
+            }
+            // Not a look at each light, since the cost of these must not grow with the lights.
+            basis @ (Basis::Light | Basis::Irradiance) => {
+                amounts_differ(slots.iter().map(|&slot| self.field.amount(basis, slot)))
+            }
+        }
+    }
+
+    /// I(y), the direct illumination of a surface point without its k_d, from known points with weights.
+    #[inline(always)]
+    pub fn estimate(&self, surface: &SurfacePoint, points: &Neighbours) -> Vec3 {
+        let scale = 1.0 / points.total_weight();
+        match self.estimator {
+            Estimator::PerLight => self.per_light(surface, points, scale),
+            Estimator::Paper => {
+                let [direct, _] = self.mean_direct_light(points, scale);
+                direct * self.lights.irradiance(surface, |_| Some([1.0; LANES]))
+            }
+            Estimator::Ratio => {
+                let [direct, unoccluded] = self.mean_direct_light(points, scale);
+                let ratio = Vec3::select(unoccluded.cmpgt(Vec3::ZERO), direct / unoccluded, Vec3::ZERO);
+                ratio * self.lights.irradiance(surface, |_| Some([1.0; LANES]))
+            }
+            Estimator::Directional => {
+                let mut sums = [Vec4::ZERO; spherical_harmonics::COEFFICIENTS];
+                for (slot, weight) in points.iter() {
+                    let values = self.field.irradiance(slot);
+                    for (sum, value) in sums.iter_mut().zip(values.as_chunks::<4>().0) {
+                        *sum += Vec4::from_array(*value) * weight;
+                    }
+                }
+                spherical_harmonics::irradiance(&sums, surface.shading_normal) * scale
+            }
+        }
+    }
+
+    /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
+    #[inline(always)]
+    fn per_light(&self, surface: &SurfacePoint, points: &Neighbours, scale: f32) -> Vec3 {
+        let chunks = self.lights.chunks().len();
+        self.lights.irradiance(surface, |chunk| {
+            let (mut all, mut any) = (VisibilityBits::MAX, 0);
+            for &slot in points.slots() {
+                let bits = self.field.bits(slot, chunks)[chunk];
+                all &= bits;
+                any |= bits;
+            }
+            // Most chunks are wholly hidden or wholly seen from all of D_y.
+            if any == 0 {
+                return None;
+            }
+            if all == self.lights.chunks()[chunk].used {
+                return Some([1.0; LANES]);
+            }
+            let mut visible: Lanes = [0.0; LANES];
+            for (slot, weight) in points.iter() {
+                let bits = self.field.bits(slot, chunks)[chunk];
+                for (lane, sum) in visible.iter_mut().enumerate() {
+                    *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
+                }
+            }
+            Some(visible.map(|sum| sum * scale))
+        })
+    }
+
+    /// Ĩ of eq. (3), and the same mean of the unoccluded field.
+    #[inline(always)]
+    fn mean_direct_light(&self, points: &Neighbours, scale: f32) -> [Vec3; 2] {
+        let mut sums = [0.0f32; 6];
+        for (slot, weight) in points.iter() {
+            for (sum, value) in sums.iter_mut().zip(self.field.light(slot)) {
+                *sum += weight * value;
+            }
+        }
+        let [a, b, c, d, e, f] = sums.map(|sum| sum * scale);
+        [Vec3::new(a, b, c), Vec3::new(d, e, f)]
+    }
+}

@@ -1,0 +1,252 @@
+//! The direct light mesh, and what surface points take from it.
+
+use glam::{Vec3, Vec4};
+
+use super::derived::Basis;
+use super::estimators::FieldEstimator;
+use super::field::DirectField;
+use super::spherical_harmonics;
+use crate::Bounds;
+use crate::accel::Accel;
+use crate::light_mesh::leaks::amounts_differ;
+use crate::light_mesh::lookup::{Lookup, LookupScratch};
+use crate::light_mesh::points::{MeshError, Neighbourhoods, PointPacket, PointSet};
+use crate::light_mesh::store::{PointMask, PointStore, UNKNOWN};
+use crate::lights::{PackedLights, VisibilityBits};
+use crate::scene::SurfacePoint;
+use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
+use crate::simd::{LANES, horizontal_extremes, horizontal_sums};
+use crate::world::World;
+
+/// Direct light mesh: points and the field at those that are known. It belongs to one scene's geometry and to its lights'
+/// places and kinds; how surface points read it is no part of it.
+pub struct DirectMesh {
+    store: PointStore,
+    field: DirectField,
+}
+
+/// How surface points read a direct mesh.
+pub struct DirectShading {
+    /// The kernel.
+    pub neighbourhoods: Neighbourhoods,
+    /// Which points of D_y count.
+    pub leaks: Leaks,
+    /// How direct illumination follows from the points.
+    pub estimator: Estimator,
+}
+
+/// What the evaluation of mesh points took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DirectEvaluation {
+    /// Points that got a value.
+    pub evaluated: u64,
+    /// Occlusion rays from these points to lights.
+    pub shadow: u64,
+    /// Rays that look for back faces around points, once for each.
+    pub inside: u64,
+}
+
+impl DirectEvaluation {
+    /// Adds another evaluation.
+    pub fn add(&mut self, other: Self) {
+        self.evaluated += other.evaluated;
+        self.shadow += other.shadow;
+        self.inside += other.inside;
+    }
+}
+
+impl DirectMesh {
+    /// Mesh over a scene of the given bounds, with no point known.
+    pub fn new(bounds: Bounds) -> Self {
+        Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
+    }
+
+    /// What it takes to read the mesh by these settings; the points that they ask for become points of the mesh.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub fn shading(
+        &mut self,
+        points: &PointSettings,
+        kernel: &KernelSettings,
+        estimator: Estimator,
+    ) -> Result<DirectShading, MeshError> {
+        let set = &mut self.store.points;
+        let neighbourhoods = Neighbourhoods::new(set, points, kernel, Neighbourhoods::AUTO_SPACINGS)?;
+        Ok(DirectShading { neighbourhoods, leaks: kernel.leaks, estimator })
+    }
+
+    /// Evaluates those of the needed points that are unknown, and whatever `shading` reads of all known ones beside.
+    pub fn evaluate<A: Accel>(
+        &mut self,
+        world: World<A>,
+        shading: &DirectShading,
+        needed: &PointMask,
+    ) -> DirectEvaluation {
+        let Self { store, field } = self;
+        let new = store.allocate(needed);
+        let evaluated = new.len() as u64;
+        let shadow = field.trace(world.accel, world.lights, new);
+        field.derive(world.lights, Basis::of(shading.estimator), store.positions());
+        let inside = if shading.leaks == Leaks::Invalidate {
+            store.find_inside(world.accel, world.scene, usize::MAX)
+        } else {
+            0
+        };
+        DirectEvaluation { evaluated, shadow, inside }
+    }
+
+    /// The mesh as surface points read it.
+    pub fn view<'a>(&'a self, lights: &'a PackedLights, shading: &'a DirectShading) -> DirectView<'a> {
+        let DirectShading { neighbourhoods, leaks, estimator } = shading;
+        DirectView {
+            lookup: Lookup { store: &self.store, neighbourhoods, leaks: *leaks },
+            estimator: FieldEstimator { field: &self.field, lights, estimator: *estimator },
+        }
+    }
+
+    /// Points, and what is known of them.
+    pub fn store(&self) -> &PointStore {
+        &self.store
+    }
+
+    /// Forgets what depends on the lights' intensities. Visibility stays.
+    pub fn forget_intensities(&mut self) {
+        self.field.forget_derived();
+    }
+
+    /// Bytes held by slots and values.
+    pub fn memory_bytes(&self) -> usize {
+        self.store.memory_bytes() + self.field.memory_bytes()
+    }
+}
+
+/// A direct mesh as surface points read it.
+#[derive(Clone, Copy)]
+pub struct DirectView<'a> {
+    /// Finds the points of D_y.
+    pub lookup: Lookup<'a>,
+    /// Makes direct illumination of them.
+    pub estimator: FieldEstimator<'a>,
+}
+
+impl DirectView<'_> {
+    /// I(y), the direct illumination of a surface point without its k_d. All points of D_y must be known.
+    #[inline(always)]
+    pub fn illumination<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Vec3 {
+        let Self { lookup, estimator } = self;
+        lookup.find(accel, surface, scratch, |slots| estimator.uncertain(slots));
+        estimator.estimate(surface, &scratch.points)
+    }
+
+    /// [`DirectView::illumination`] of a surface point that is one of several in a row of the same normal.
+    ///
+    /// They differ in the weights of the mesh points only, so that `directional` needs what each mesh point gives to
+    /// that normal just once.
+    #[inline(always)]
+    pub fn illumination_in_row<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Vec3 {
+        if self.estimator.estimator == Estimator::Directional
+            && let Some(light) = self.directional_in_row(surface, scratch)
+        {
+            return light;
+        }
+        self.illumination(accel, surface, scratch)
+    }
+
+    /// The estimate `directional`; `None` where D_y is empty, or has to be looked at more closely.
+    #[inline(always)]
+    fn directional_in_row(&self, surface: &SurfacePoint, scratch: &mut LookupScratch) -> Option<Vec3> {
+        let (kernel, around) = self.lookup.around_in(surface, scratch)?;
+        if *around.normal != surface.shading_normal {
+            *around.normal = surface.shading_normal;
+            around.packets.iter_mut().for_each(|packet| self.light_packet(packet, surface.shading_normal));
+        }
+        let mut sums = [[0.0f32; LANES]; 4];
+        let (mut least, mut most) = ([f32::INFINITY; LANES], [0.0f32; LANES]);
+        for packet in around.packets {
+            let (weights, _) = packet.weigh(&kernel);
+            let [r, g, b] = &packet.lit;
+            for lane in 0..LANES {
+                // Points that don't count are marked by an amount below 0.
+                let amount = packet.amount[lane];
+                let counts = amount >= 0.0 && weights[lane] > 0.0;
+                let weight = if counts { weights[lane] } else { 0.0 };
+                sums[0][lane] += weight * r[lane];
+                sums[1][lane] += weight * g[lane];
+                sums[2][lane] += weight * b[lane];
+                sums[3][lane] += weight;
+                let (low, high) = if counts { (amount, amount) } else { (f32::INFINITY, 0.0) };
+                least[lane] = if low < least[lane] { low } else { least[lane] };
+                most[lane] = if high > most[lane] { high } else { most[lane] };
+            }
+        }
+        let [r, g, b, weights] = &sums;
+        let sums = horizontal_sums([r, g, b, weights]);
+        let differ = self.lookup.leaks == Leaks::Visibility
+            && amounts_differ(horizontal_extremes(&least, &most).into_iter());
+        (sums.w > 0.0 && !differ).then(|| sums.truncate().max(Vec3::ZERO) / sums.w)
+    }
+
+    /// Whether the point in a slot counts for no surface point.
+    #[inline(always)]
+    fn drops(&self, slot: u32) -> bool {
+        self.lookup.leaks == Leaks::Invalidate && self.lookup.store.is_inside(slot)
+    }
+
+    /// Notes the irradiance of a normal at the points of a packet.
+    #[inline(always)]
+    fn light_packet(&self, packet: &mut PointPacket, normal: Vec3) {
+        let monomials = spherical_harmonics::monomials(normal);
+        for lane in 0..LANES {
+            let slot = packet.slots[lane];
+            packet.amount[lane] = -1.0;
+            if slot == UNKNOWN || self.drops(slot) {
+                continue;
+            }
+            let mut light = Vec4::ZERO;
+            let values = self.estimator.field.irradiance(slot);
+            for (value, monomial) in values.as_chunks::<4>().0.iter().zip(monomials) {
+                light += Vec4::from_array(*value) * monomial;
+            }
+            (0..3).for_each(|channel| packet.lit[channel][lane] = light[channel]);
+            packet.amount[lane] = self.estimator.field.amount(Basis::Irradiance, slot);
+        }
+    }
+
+    /// Classifies the lights by D_y: per chunk those that all of its points see (`seen`), and those on which they disagree
+    /// (`uncertain`).
+    #[inline(always)]
+    pub fn classify<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+        seen: &mut [VisibilityBits],
+        uncertain: &mut [VisibilityBits],
+    ) {
+        // Where the points disagree, rays to the lights themselves decide: fewer points would only hide it.
+        self.lookup.find(accel, surface, scratch, |_| false);
+        let FieldEstimator { field, lights, .. } = self.estimator;
+        let chunks = lights.chunks().len();
+        seen.fill(VisibilityBits::MAX);
+        uncertain.fill(0);
+        for &slot in scratch.points.slots() {
+            let bits = field.bits(slot, chunks);
+            for ((all, any), bits) in seen.iter_mut().zip(&mut *uncertain).zip(bits) {
+                *all &= bits;
+                *any |= bits;
+            }
+        }
+        uncertain.iter_mut().zip(seen).for_each(|(any, all)| *any &= !*all);
+    }
+}

@@ -1,0 +1,172 @@
+//! Solving: eq. (4) for new mesh points, bounce after bounce.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::gather::{Gathering, POINTS_PER_TASK};
+use super::octahedral::IrradianceSums;
+use super::patches::Patches;
+use super::{DirectTransport, IndirectMesh, IndirectShadingView};
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
+use crate::light_mesh::direct::DirectMesh;
+use crate::light_mesh::lookup::LookupScratch;
+use crate::sampling::hash_to_unit_cube;
+use crate::scene::{Ray, SurfacePoint};
+use crate::settings::IndirectForm;
+use crate::world::World;
+
+impl IndirectMesh {
+    /// Eq. (4) for new points: one bounce, then as many more as asked for or until nothing changes any more.
+    /// Returns the number of occlusion rays that it took to see emitters and to keep light from leaking.
+    pub(super) fn solve<A: Accel>(
+        &mut self,
+        world: World<A>,
+        direct: &DirectMesh,
+        transport: DirectTransport,
+        shading: &IndirectShadingView,
+        gathering: &Gathering,
+    ) -> u64 {
+        let World { accel, scene, lights, emissive } = world;
+        let direct = direct.view(lights, transport.shading);
+        let first = self.values.len();
+        let directions = self.strata.len() as usize;
+        let (one_bounce, mut rays) = self.sweep(gathering, |point, sums, scratch| {
+            let (x, hits) = (gathering.points[point], &gathering.hits[point * directions..][..directions]);
+            self.for_each_hit(scene, x, hits, |cell, direction, surface| {
+                let light = surface.map_or(scene.background, |surface| {
+                    let illumination = direct.illumination(accel, &surface.point, scratch) * transport.scale;
+                    let share = match &hits[cell] {
+                        Some(hit) if surface.emission != Vec3::ZERO => {
+                            self.mis_weight(emissive.pdf(scene, x, hit, &surface.point))
+                        }
+                        _ => 1.0,
+                    };
+                    surface.emission * share + surface.diffuse * illumination
+                });
+                self.accumulate(sums, direction, light);
+            });
+            scratch.rays += self.add_emissive(world, x, sums);
+        });
+        self.values.extend_from_slice(&one_bounce);
+        if self.settings.bounces == 1 {
+            return rays;
+        }
+        // A quarter of R: a fraction of what the mean over D_y blurs.
+        let width = |surface: &SurfacePoint| 0.25 * shading.neighbourhoods.radius_at(surface.position);
+        let patches = Patches::new(gathering.hits.len(), width, |hit| {
+            let x = gathering.points[hit / directions];
+            let direction = self.strata.jittered((hit % directions) as u32, x);
+            gathering.hits[hit].as_ref().map(|hit| scene.interaction(hit, direction))
+        });
+        let peak =
+            |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
+        for _ in 1..self.settings.bounces {
+            let view = self.view(shading);
+            let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
+                .patches
+                .par_iter()
+                .map_init(LookupScratch::default, |scratch, patch| {
+                    scratch.rays = 0;
+                    (patch.diffuse * view.illumination(accel, &patch.surface, scratch), scratch.rays)
+                })
+                .unzip();
+            rays += traced.iter().sum::<u64>();
+            let (mut next, _) = self.sweep(gathering, |point, sums, _| {
+                let x = gathering.points[point];
+                for cell in 0..directions {
+                    if let Some(patch) = patches.of(point * directions + cell) {
+                        self.accumulate(sums, self.strata.jittered(cell as u32, x), radiance[patch]);
+                    }
+                }
+            });
+            let flat = next.as_flattened_mut();
+            flat.iter_mut().zip(one_bounce.as_flattened()).for_each(|(value, first)| *value += first);
+            let change = flat
+                .iter()
+                .zip(self.values[first..].as_flattened())
+                .fold(0.0f32, |change, (next, value)| change.max((next - value).abs()));
+            let done = change <= self.settings.tolerance * peak(&next);
+            self.values[first..].copy_from_slice(&next);
+            if done {
+                break;
+            }
+        }
+        rays
+    }
+
+    /// MIS weight of rays that could find a point on an emissive triangle: the share of the directions of eq. (4) in the pdf of
+    /// all such rays, the others being chosen with a pdf of `pdf` each.
+    #[inline(always)]
+    fn mis_weight(&self, pdf: f32) -> f32 {
+        if self.settings.emitter_samples == 0 {
+            return 1.0;
+        }
+        let ours = self.strata.len() as f32 / (4.0 * PI);
+        ours / (ours + self.settings.emitter_samples as f32 * pdf)
+    }
+
+    /// Adds the light of points on emissive triangles, chosen by their power, that the mesh point at `x` sees; returns the
+    /// number of rays.
+    #[inline(always)]
+    fn add_emissive<A: Accel>(&self, world: World<A>, x: Vec3, sums: &mut IrradianceSums) -> u64 {
+        let World { accel, scene, emissive, .. } = world;
+        const WIDTH: u32 = 16;
+        let count = self.settings.emitter_samples;
+        let noise = hash_to_unit_cube(x);
+        let mut rays = 0;
+        for first in (0..count).step_by(WIDTH as usize) {
+            let mut packet = RayPacket::<{ WIDTH as usize }>::empty();
+            let mut active: LaneMask = 0;
+            let mut found = [(Vec3::ZERO, Vec3::ZERO); WIDTH as usize];
+            for (lane, k) in (first..count.min(first + WIDTH)).enumerate() {
+                if let Some(sample) = emissive.sample(scene, x, k, count, noise) {
+                    packet.set_lane(lane, &Ray::between(x, sample.surface.ray_origin()));
+                    active |= 1 << lane;
+                    let light = sample.emission * self.mis_weight(sample.pdf);
+                    found[lane] = (sample.direction, light);
+                }
+            }
+            rays += u64::from(active.count_ones());
+            let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
+            for (lane, &(direction, light)) in found.iter().enumerate() {
+                if (active & !blocked) >> lane & 1 == 1 {
+                    self.accumulate(sums, direction, light);
+                }
+            }
+        }
+        rays
+    }
+
+    /// Calls `gather(point, sums, scratch)` for all points and returns the values that the sums make, and the rays that
+    /// scratch counted.
+    fn sweep(
+        &self,
+        gathering: &Gathering,
+        gather: impl Fn(usize, &mut IrradianceSums, &mut LookupScratch) + Sync,
+    ) -> (Vec<[f32; 3]>, u64) {
+        let entries = self.entries();
+        let directions = self.strata.len() as f32;
+        let mut values = vec![[0.0f32; 3]; gathering.points.len() * entries];
+        let rays = values
+            .par_chunks_mut(entries)
+            .enumerate()
+            .with_max_len(POINTS_PER_TASK)
+            .map_init(IrradianceSums::default, |sums, (point, values)| {
+                sums.clear();
+                let mut scratch = LookupScratch::default();
+                gather(point, sums, &mut scratch);
+                sums.write_means(directions, values);
+                scratch.rays
+            })
+            .sum();
+        (values, rays)
+    }
+
+    /// Adds light from one direction to a point's sums.
+    #[inline(always)]
+    fn accumulate(&self, sums: &mut IrradianceSums, direction: Vec3, light: Vec3) {
+        sums.add(direction, light, self.settings.form == IndirectForm::Directional);
+    }
+}

@@ -1,0 +1,88 @@
+//! What surface points take from an indirect mesh: eq. (5).
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::IndirectMesh;
+use super::octahedral::OctahedralWeights;
+use crate::accel::Accel;
+use crate::light_mesh::leaks::amounts_differ;
+use crate::light_mesh::lookup::{Lookup, LookupScratch};
+use crate::light_mesh::points::Neighbourhoods;
+use crate::scene::SurfacePoint;
+use crate::settings::{IndirectForm, IndirectShading, Normalization};
+
+/// How surface points read an indirect mesh.
+pub struct IndirectShadingView {
+    /// The kernel.
+    pub neighbourhoods: Neighbourhoods,
+    /// The settings that it follows from.
+    pub shading: IndirectShading,
+}
+
+/// An indirect mesh as surface points read it.
+#[derive(Clone, Copy)]
+pub struct IndirectView<'a> {
+    mesh: &'a IndirectMesh,
+    /// Finds the points of D_y.
+    pub lookup: Lookup<'a>,
+    shading: &'a IndirectShading,
+}
+
+impl IndirectMesh {
+    /// The mesh as surface points read it.
+    pub fn view<'a>(&'a self, view: &'a IndirectShadingView) -> IndirectView<'a> {
+        let IndirectShadingView { neighbourhoods, shading } = view;
+        let lookup = Lookup { store: &self.store, neighbourhoods, leaks: shading.kernel.leaks };
+        IndirectView { mesh: self, lookup, shading }
+    }
+}
+
+impl IndirectView<'_> {
+    /// Ĩ_d of eq. (5) at a surface point, all of whose D_y must be known; with the mean normalization it is the
+    /// radiance that an all-white surface would send back.
+    #[inline(always)]
+    pub fn illumination<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Vec3 {
+        let Self { mesh, lookup, shading } = self;
+        lookup.find(accel, surface, scratch, |slots| self.uncertain(slots));
+        let points = &mut scratch.points;
+        if shading.at_surface {
+            let (y, normal) = (surface.position, surface.geometric_normal);
+            let positions = lookup.store.positions();
+            points.extrapolate_to_surface(|slot| normal.dot(positions[slot as usize] - y));
+        }
+        let points = &*points;
+        let mut sum = Vec3::ZERO;
+        match mesh.settings.form {
+            IndirectForm::Scalar => {
+                for (slot, weight) in points.iter() {
+                    sum += Vec3::from_array(mesh.value(slot)[0]) * weight;
+                }
+            }
+            IndirectForm::Directional => {
+                let by_normal = OctahedralWeights::of(surface.shading_normal);
+                for (slot, weight) in points.iter() {
+                    sum += by_normal.apply(mesh.value(slot)) * weight;
+                }
+            }
+        }
+        let scale = match shading.normalization {
+            Normalization::Mean => 1.0 / points.total_weight(),
+            Normalization::Integral => 4.0 * PI / points.total_weight(),
+        };
+        // The mean and far points may enter with weights below 0, so that a single lamp may leave a trace of darkness behind it.
+        sum.max(Vec3::ZERO) * scale
+    }
+
+    /// Whether the points see so different amounts of light that a wall may stand between them.
+    #[inline(always)]
+    fn uncertain(&self, slots: &[u32]) -> bool {
+        amounts_differ(slots.iter().map(|&slot| self.mesh.value(slot)[0].iter().sum()))
+    }
+}

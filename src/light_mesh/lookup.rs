@@ -1,0 +1,235 @@
+//! Looking up the known mesh points of D_y, and which of them count for a surface point.
+
+use super::leaks::{LeakGuard, LeakedPoints};
+use super::points::{CellCache, Kernel, Neighbourhoods, Neighbours, PointPacket, Surroundings};
+use super::store::{NeededPoints, PointMask, PointStore, UNKNOWN};
+use crate::accel::Accel;
+use crate::scene::SurfacePoint;
+use crate::settings::Leaks;
+
+/// A mesh's points as surface points see them: with a kernel.
+#[derive(Clone, Copy)]
+pub struct Lookup<'a> {
+    /// The points.
+    pub store: &'a PointStore,
+    /// The kernel, in every part of space.
+    pub neighbourhoods: &'a Neighbourhoods,
+    /// Which points of D_y count.
+    pub leaks: Leaks,
+}
+
+/// Working memory and counters of one thread while it looks up mesh points.
+#[derive(Default)]
+pub struct LookupScratch {
+    /// D_y.
+    pub(super) points: Neighbours,
+    /// What surface points that lie close together share; `None` where they come from anywhere.
+    cells: Option<CellCache>,
+    /// Occlusion rays traced from surface points to mesh points.
+    pub rays: u64,
+    /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
+    pub fallbacks: u64,
+}
+
+impl LookupScratch {
+    /// For surface points that lie close together. It must not outlive the next evaluation of mesh points.
+    pub fn for_tile() -> Self {
+        Self { cells: Some(CellCache::default()), ..Self::default() }
+    }
+}
+
+impl Lookup<'_> {
+    /// Finds the points of D_y that count for a surface point; all must be known.
+    ///
+    /// `uncertain` reports whether the points in some slots differ so much that it matters which of them the surface point
+    /// sees.
+    #[inline(always)]
+    pub(super) fn find<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+        uncertain: impl Fn(&[u32]) -> bool,
+    ) {
+        let fallback = match &mut scratch.cells {
+            Some(cells) => self.known_within(surface, cells, &mut scratch.points),
+            None => self.known(surface, &mut scratch.points),
+        };
+        scratch.fallbacks += u64::from(fallback);
+        if self.leaks == Leaks::Allow {
+            return;
+        }
+        let guard = LeakGuard { accel, leaks: self.leaks, positions: self.store.positions() };
+        let LeakedPoints { rays, all_dropped } =
+            guard.keep_counting(surface, &mut scratch.points, |slot| self.store.is_inside(slot), uncertain);
+        scratch.rays += rays;
+        scratch.fallbacks += u64::from(all_dropped);
+    }
+
+    /// D_y with slots for one of many surface points that lie close together: `cells` keeps what is the same for all. It must
+    /// not outlive the next evaluation of mesh points. Returns whether D_y was empty and the nearest point took its place.
+    #[inline(always)]
+    pub fn known_within(&self, surface: &SurfacePoint, cells: &mut CellCache, out: &mut Neighbours) -> bool {
+        out.clear();
+        if let Some((kernel, around)) = self.around(surface, cells) {
+            for packet in around.packets {
+                let (weights, lanes) = packet.weigh(&kernel);
+                out.push_packet(packet, &weights, lanes);
+            }
+        }
+        out.is_empty() && self.known(surface, out)
+    }
+
+    /// D_y with slots for any surface point; returns whether it was empty and the nearest point took its place.
+    #[inline(never)]
+    pub fn known(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
+        let fallback = self.neighbourhoods.find(&self.store.points, surface, out);
+        out.find_slots(|id| {
+            let slot = self.store.slot(id);
+            debug_assert_ne!(slot, UNKNOWN, "a point that is used was never evaluated");
+            slot
+        });
+        fallback
+    }
+
+    /// The kernel of a surface point, and all points that may lie in it; `None` where that would be no help.
+    #[inline(always)]
+    pub(super) fn around<'c>(
+        &self,
+        surface: &SurfacePoint,
+        cells: &'c mut CellCache,
+    ) -> Option<(Kernel, Surroundings<'c>)> {
+        let store = self.store;
+        self.neighbourhoods.around(&store.points, surface, cells, |id| store.slot(id), |_| {})
+    }
+
+    /// The same from the scratch of a tile.
+    #[inline(always)]
+    pub(super) fn around_in<'c>(
+        &self,
+        surface: &SurfacePoint,
+        scratch: &'c mut LookupScratch,
+    ) -> Option<(Kernel, Surroundings<'c>)> {
+        self.around(surface, scratch.cells.as_mut()?)
+    }
+
+    /// The points in the neighbourhoods of surface points, which should lie close together, known or not.
+    #[inline(always)]
+    pub fn needed<'a>(&self, surfaces: impl Iterator<Item = &'a SurfacePoint>) -> NeededPoints {
+        let (mut cells, mut neighbours) = (CellCache::default(), Neighbours::default());
+        let mut needed = NeededPoints::default();
+        let points = &self.store.points;
+        for surface in surfaces {
+            let mut found = 0;
+            let forget = |packet: &PointPacket| packet.needed_ids().for_each(|id| needed.insert(id));
+            if let Some((kernel, around)) =
+                self.neighbourhoods.around(points, surface, &mut cells, |_| UNKNOWN, forget)
+            {
+                for packet in around.packets {
+                    let (_, lanes) = packet.weigh(&kernel);
+                    packet.needed |= lanes;
+                    found |= lanes;
+                }
+            }
+            if found == 0 {
+                self.neighbourhoods.find(points, surface, &mut neighbours);
+                neighbours.ids().iter().for_each(|&id| needed.insert(id));
+            }
+        }
+        cells.packets().iter().flat_map(PointPacket::needed_ids).for_each(|id| needed.insert(id));
+        needed
+    }
+
+    /// [`Lookup::needed`] of surface points that come from anywhere.
+    pub fn needed_anywhere<'a>(&self, surfaces: impl Iterator<Item = &'a SurfacePoint>) -> PointMask {
+        PointMask::union(self.needed(surfaces).into_bricks())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Bounds;
+    use crate::light_mesh::points::PointSet;
+    use crate::sampling::SplitMix64;
+    use crate::settings::{
+        KernelSettings, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing,
+    };
+    use glam::Vec3;
+
+    const BOUNDS: Bounds = Bounds { min: Vec3::new(-3.0, 0.0, 2.0), max: Vec3::new(3.0, 2.5, 6.0) };
+
+    fn surfaces(count: usize, shift: Vec3) -> Vec<SurfacePoint> {
+        let mut random = SplitMix64::new(5);
+        let surface = |_| {
+            let normal = random.in_box(Vec3::NEG_ONE, Vec3::ONE).normalize_or(Vec3::Y);
+            SurfacePoint::flat(shift + random.in_box(BOUNDS.min - 0.3, BOUNDS.max + 0.3), normal)
+        };
+        (0..count).map(surface).collect()
+    }
+
+    /// The mesh points found by way of cells are those that a search for each surface point finds, with the same weights
+    /// in the same order, and the slots that the table gives; for every layout, neighbourhood and region, far from the
+    /// origin, and with more cells than are kept.
+    #[test]
+    fn cells_give_what_a_search_for_every_point_gives() {
+        let list: Vec<_> = (0..300).map(|i| SplitMix64::new(i).in_box(BOUNDS.min, BOUNDS.max)).collect();
+        let layouts = [
+            PointLayout::Regular,
+            PointLayout::BodyCentred,
+            PointLayout::Jittered { seed: 3 },
+            PointLayout::BlueNoise { seed: 3 },
+            PointLayout::List(list.into()),
+        ];
+        let hoods = [Neighbourhood::SmoothSphere, Neighbourhood::Sphere, Neighbourhood::Nearest];
+        for (number, layout) in layouts.into_iter().enumerate() {
+            for (neighbourhood, hemisphere) in hoods.into_iter().zip([true, false, true]) {
+                let shift = if number == 1 { Vec3::splat(1000.0) } else { Vec3::ZERO };
+                let shifted = Bounds { min: BOUNDS.min + shift, max: BOUNDS.max + shift };
+                let fine = Region {
+                    bounds: Bounds { min: shifted.min, max: shifted.min + 1.5 },
+                    spacing: Some(Vec3::splat(0.11)),
+                    radius: None,
+                };
+                let settings = PointSettings {
+                    layout: layout.clone(),
+                    spacing: Spacing::Units(Vec3::new(0.4, 0.3, 0.35)),
+                    regions: vec![fine],
+                };
+                let kernel = KernelSettings {
+                    radius: Radius::Spacings(1.4),
+                    neighbourhood,
+                    hemisphere,
+                    leaks: Leaks::Allow,
+                };
+                let mut points = PointSet::new(shifted);
+                let neighbourhoods = Neighbourhoods::new(&mut points, &settings, &kernel, 1.0);
+                let neighbourhoods = neighbourhoods.expect("a modest grid");
+                let mut store = PointStore::new(points);
+                let surfaces = surfaces(3000, shift);
+
+                let mut needed = NeededPoints::default();
+                let mut expected = Neighbours::default();
+                for surface in &surfaces {
+                    neighbourhoods.find(&store.points, surface, &mut expected);
+                    expected.ids().iter().for_each(|&id| needed.insert(id));
+                }
+                let expected_mask = PointMask::union(needed.into_bricks());
+                let lookup = Lookup { store: &store, neighbourhoods: &neighbourhoods, leaks: Leaks::Allow };
+                let mask = lookup.needed_anywhere(surfaces.iter());
+                assert_eq!(mask, expected_mask, "{layout:?}, {neighbourhood:?}");
+
+                store.allocate(&mask);
+                let lookup = Lookup { store: &store, neighbourhoods: &neighbourhoods, leaks: Leaks::Allow };
+                let (mut cells, mut found) = (CellCache::default(), Neighbours::default());
+                for surface in &surfaces {
+                    let fallback = lookup.known(surface, &mut expected);
+                    assert_eq!(lookup.known_within(surface, &mut cells, &mut found), fallback);
+                    assert_eq!(found.ids(), expected.ids(), "{layout:?}, {neighbourhood:?}");
+                    assert_eq!(found.weights(), expected.weights());
+                    assert_eq!(found.slots(), expected.slots());
+                }
+            }
+        }
+    }
+}

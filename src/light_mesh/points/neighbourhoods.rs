@@ -1,0 +1,190 @@
+//! The shape of D_y in every part of space (method §3, §8).
+
+use glam::Vec3;
+
+use super::cells::{CellCache, PointPacket, Surroundings};
+use super::kernel::Kernel;
+use super::{MeshError, Neighbours, PointSet};
+use crate::Bounds;
+use crate::scene::SurfacePoint;
+use crate::settings::{KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
+
+/// A part of space with points and a radius of its own.
+struct Zone {
+    /// Where it holds; `None` for everywhere.
+    bounds: Option<Bounds>,
+    /// Number of its layer of points.
+    layer: usize,
+    radius: f32,
+    /// The kernel of this radius, around any point.
+    kernel: Kernel,
+    /// Side of the cells whose surface points share a search for mesh points, and 1 over it; `None` where D_y is no
+    /// ball, or where coordinates are so large that they hardly tell cells apart.
+    cells: Option<(f32, f32)>,
+}
+
+/// Side of the cells in units of R: smaller ones hold fewer surface points, larger ones have more mesh points around
+/// that most of them don't need.
+const CELL_SIDE: f32 = 0.3;
+
+/// Cells are told apart up to this far from the origin, in units of their side.
+const FARTHEST_CELL: f32 = (1 << 20) as f32;
+
+/// Which layer of points and which kernel a surface point takes.
+pub struct Neighbourhoods {
+    /// The whole scene first, then the regions: the last one that holds y decides.
+    zones: Vec<Zone>,
+    neighbourhood: Neighbourhood,
+    hemisphere: bool,
+}
+
+impl Neighbourhoods {
+    /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
+    pub const AUTO_SPACINGS: f32 = 120.0;
+
+    /// Adds the layers that the settings ask for to `points`. An automatic spacing is the scene's diagonal over
+    /// `auto_spacings`.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub fn new(
+        points: &mut PointSet,
+        settings: &PointSettings,
+        kernel: &KernelSettings,
+        auto_spacings: f32,
+    ) -> Result<Self, MeshError> {
+        let bounds = points.bounds();
+        let spacing = match settings.spacing {
+            Spacing::Units(spacing) => spacing,
+            Spacing::Auto => {
+                let diagonal = bounds.extent().length();
+                Vec3::splat(if diagonal > 0.0 { diagonal / auto_spacings } else { 1.0 })
+            }
+        };
+        let radius_for = |spacing: Vec3| match kernel.radius {
+            Radius::Units(radius) => radius,
+            Radius::Spacings(factor) => factor * spacing.max_element(),
+        };
+        let mut zone = |region: Option<Bounds>, spacing: Vec3, radius: f32| {
+            let layer = points.layer(&settings.layout, spacing)?;
+            Ok(Zone::new(bounds, region, kernel.neighbourhood, layer, radius))
+        };
+        let mut zones = vec![zone(None, spacing, radius_for(spacing))?];
+        for region in &settings.regions {
+            let spacing = region.spacing.unwrap_or(spacing);
+            let radius = region.radius.unwrap_or_else(|| radius_for(spacing));
+            zones.push(zone(Some(region.bounds), spacing, radius)?);
+        }
+        Ok(Self { zones, neighbourhood: kernel.neighbourhood, hemisphere: kernel.hemisphere })
+    }
+
+    /// About how many points the neighbourhoods of surface points can reach.
+    pub fn count(&self, points: &PointSet) -> u64 {
+        let bounds = points.bounds();
+        let count = |zone: &Zone| {
+            let of = zone.bounds.unwrap_or(bounds);
+            points.count_in(zone.layer, Bounds { min: of.min - zone.radius, max: of.max + zone.radius })
+        };
+        if bounds.is_empty() { 0 } else { self.zones.iter().map(count).sum() }
+    }
+
+    #[inline(always)]
+    fn zone_number_at(&self, y: Vec3) -> usize {
+        let mut found = 0;
+        for (number, zone) in self.zones.iter().enumerate().skip(1) {
+            if zone.bounds.is_some_and(|bounds| bounds.contains(y)) {
+                found = number;
+            }
+        }
+        found
+    }
+
+    /// R at a position.
+    #[inline(always)]
+    pub fn radius_at(&self, y: Vec3) -> f32 {
+        self.zones[self.zone_number_at(y)].radius
+    }
+
+    /// The kernel of a surface point, unless the neighbourhood is the nearest point.
+    pub fn kernel(&self, surface: &SurfacePoint) -> Kernel {
+        self.kernel_in(&self.zones[self.zone_number_at(surface.position)], surface)
+    }
+
+    #[inline(always)]
+    fn kernel_in(&self, zone: &Zone, surface: &SurfacePoint) -> Kernel {
+        let normal = self.hemisphere.then_some(surface.geometric_normal);
+        zone.kernel.around(surface.position, normal)
+    }
+
+    /// D_y of a surface point with weights, in a fixed order; returns whether it was empty and the nearest
+    /// point took its place. Never empty afterwards.
+    #[inline(never)]
+    pub fn find(&self, points: &PointSet, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
+        out.clear();
+        let zone = &self.zones[self.zone_number_at(surface.position)];
+        let kernel = self.kernel_in(zone, surface);
+        if self.neighbourhood != Neighbourhood::Nearest {
+            points.gather(zone.layer, &kernel, out);
+        }
+        let fallback = out.is_empty();
+        if fallback {
+            out.push(points.nearest(zone.layer, &kernel), 1.0);
+        }
+        fallback && self.neighbourhood != Neighbourhood::Nearest
+    }
+
+    /// The kernel of a surface point, and all points that may lie in it, from the cell cache; `None` where that would be no
+    /// help. `slot` gives the slots of points; `forget` receives the packets that the cache drops.
+    #[inline(always)]
+    pub fn around<'a>(
+        &self,
+        points: &PointSet,
+        surface: &SurfacePoint,
+        cells: &'a mut CellCache,
+        slot: impl Fn(u64) -> u32,
+        forget: impl FnMut(&PointPacket),
+    ) -> Option<(Kernel, Surroundings<'a>)> {
+        let number = self.zone_number_at(surface.position);
+        let zone = &self.zones[number];
+        let (side, inverse) = zone.cells?;
+        let place = (surface.position * inverse).floor();
+        let cell = (number as u32, place.as_ivec3());
+        let surround = |each: &mut dyn FnMut(u64, u32, Vec3)| {
+            zone.surround(points, place, side, |id, position| each(id, slot(id), position));
+        };
+        let around = cells.around(cell, surround, forget);
+        Some((self.kernel_in(zone, surface), around))
+    }
+}
+
+impl Zone {
+    fn new(
+        bounds: Bounds,
+        region: Option<Bounds>,
+        neighbourhood: Neighbourhood,
+        layer: usize,
+        radius: f32,
+    ) -> Self {
+        let kernel = Kernel::new(Vec3::ZERO, None, radius, neighbourhood == Neighbourhood::SmoothSphere);
+        let side = CELL_SIDE * radius;
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element() / side;
+        let shared =
+            neighbourhood != Neighbourhood::Nearest && (bounds.is_empty() || farthest < FARTHEST_CELL);
+        Self { bounds: region, layer, radius, kernel, cells: shared.then_some((side, 1.0 / side)) }
+    }
+
+    /// Calls `each(id, position)` for the points that may lie in the kernel of some point in a cell.
+    fn surround(&self, points: &PointSet, place: Vec3, side: f32, mut each: impl FnMut(u64, Vec3)) {
+        let center = (place + 0.5) * side;
+        // What rounding may add to R, generously.
+        let slack = 1e-4 * self.radius + 16.0 * f32::EPSILON * center.abs().max_element();
+        let reach = self.radius + slack;
+        let half = Vec3::splat(0.5 * side + reach);
+        points.for_each_in_box(self.layer, center - half, center + half, |id, position| {
+            let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
+            if beside.length_squared() < reach * reach {
+                each(id, position);
+            }
+        });
+    }
+}

@@ -1,0 +1,309 @@
+//! The lights as structures of arrays, and the one loop that sums their contributions.
+
+use glam::Vec3;
+
+use super::VisibilityBits;
+use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
+use super::shapes::ShapeLanes;
+use crate::scene::{Falloff, LightShape, PointLight, Scene, SurfacePoint};
+use crate::simd::{LANES, Lanes, horizontal_sums};
+
+/// Sixteen lights.
+#[derive(Clone, Debug)]
+pub struct LightChunk {
+    /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
+    pub position: [Lanes; 3],
+    /// What lights that are no point lights differ in; `None` where all lanes are point lights.
+    shapes: Option<Box<ShapeLanes>>,
+    /// E, by channel; 0 in lanes that hold no light.
+    pub intensity: [Lanes; 3],
+    /// The lanes that hold a light.
+    pub used: VisibilityBits,
+}
+
+impl LightChunk {
+    /// The way from `x` to the light in `lane`: its end is beyond all that could hide the light.
+    #[inline(always)]
+    pub fn to_light(&self, lane: usize, x: [f32; 3]) -> [f32; 3] {
+        let local = self.shapes.as_ref().map_or(1.0, |shapes| shapes.local[lane]);
+        [0, 1, 2].map(|axis| self.position[axis][lane] - local * x[axis])
+    }
+}
+
+/// All lights of a scene in chunks of 16.
+///
+/// The order is that of the scene, except that point lights come first, and lights are sorted along a Morton curve:
+/// lights in one chunk are neighbours, so that they are mostly seen together or hidden together.
+#[derive(Clone, Debug)]
+pub struct PackedLights {
+    chunks: Vec<LightChunk>,
+    falloff: Falloff,
+    count: usize,
+}
+
+impl PackedLights {
+    /// Table of a scene's lights.
+    pub fn of_scene(scene: &Scene) -> Self {
+        let directional = |light: &PointLight| matches!(light.shape, LightShape::Directional { .. });
+        let reach = if scene.lights.iter().any(directional) {
+            // From wherever mesh points are, a margin around the scene, to beyond its far side.
+            4.0 * scene.bounds().extent().length()
+        } else {
+            0.0
+        };
+        Self::new(&scene.lights, scene.falloff, reach)
+    }
+
+    /// Table of lights; occlusion rays to directional lights are `reach` long.
+    pub fn new(lights: &[PointLight], falloff: Falloff, reach: f32) -> Self {
+        let mut order: Vec<usize> = (0..lights.len()).collect();
+        let mut bounds = crate::Bounds::EMPTY;
+        lights.iter().for_each(|light| bounds.extend(light.position));
+        order.sort_by_key(|&i| (lights[i].shape != LightShape::Point, morton(lights[i].position, bounds), i));
+        let chunks = order
+            .chunks(LANES)
+            .map(|members| {
+                let zero = [[0.0; LANES]; 3];
+                let mut chunk = LightChunk { position: zero, shapes: None, intensity: zero, used: 0 };
+                for (lane, light) in members.iter().map(|&i| &lights[i]).enumerate() {
+                    let position = match light.shape {
+                        LightShape::Directional { direction } => direction * -reach.max(1.0),
+                        _ => light.position,
+                    };
+                    if light.shape != LightShape::Point {
+                        let shapes = chunk.shapes.get_or_insert_with(|| Box::new(ShapeLanes::POINTS));
+                        shapes.set(lane, light.shape);
+                    }
+                    for axis in 0..3 {
+                        chunk.position[axis][lane] = position[axis];
+                        chunk.intensity[axis][lane] = light.intensity[axis];
+                    }
+                    chunk.used |= 1 << lane;
+                }
+                chunk
+            })
+            .collect();
+        Self { chunks, falloff, count: lights.len() }
+    }
+
+    /// The chunks.
+    #[inline(always)]
+    pub fn chunks(&self) -> &[LightChunk] {
+        &self.chunks
+    }
+
+    /// φ1.
+    #[inline(always)]
+    pub fn falloff(&self) -> Falloff {
+        self.falloff
+    }
+
+    /// Number of lights.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// Place of a position along a Morton curve through the bounds, 10 bits per axis.
+fn morton(position: Vec3, bounds: crate::Bounds) -> u32 {
+    let extent = bounds.extent().max(Vec3::splat(f32::MIN_POSITIVE));
+    let cell = ((position - bounds.min) / extent * 1023.0).as_uvec3();
+    let spread = |v: u32| (0..10).fold(0, |code, bit| code | (v >> bit & 1) << (3 * bit));
+    spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+}
+
+/// Where a light coincides with the point it lights, t is raised to this, so that 0/0 can't arise.
+const TINY_DISTANCE: f32 = 1e-18;
+
+impl PackedLights {
+    /// Σ_i V_i · φ2(n_y, lp_i − y) · E_i / φ1(|lp_i − y|), with the visibility V of each chunk's lights given by
+    /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of spec §4.
+    ///
+    /// Lights behind the triangle's plane give nothing, whatever the shading normal says (spec §7).
+    #[inline(always)]
+    pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl FnMut(usize) -> Option<Lanes>) -> Vec3 {
+        with_falloff!(self.falloff, law => self.irradiance_with(surface, law, visibility))
+    }
+
+    #[inline(always)]
+    fn irradiance_with(
+        &self,
+        surface: &SurfacePoint,
+        law: impl FalloffLaw,
+        mut visibility: impl FnMut(usize) -> Option<Lanes>,
+    ) -> Vec3 {
+        let y = surface.position;
+        let (n, g) = (surface.shading_normal, surface.geometric_normal);
+        let mut sums = [[0.0f32; LANES]; 3];
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let Some(visible) = visibility(index) else { continue };
+            let mut factor = [0.0f32; LANES];
+            if let Some(shapes) = &chunk.shapes {
+                for lane in 0..LANES {
+                    let d = chunk.to_light(lane, y.to_array());
+                    let [dx, dy, dz] = d;
+                    let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                    let cosine = n.x * dx + n.y * dy + n.z * dz;
+                    let side = g.x * dx + g.y * dy + g.z * dz;
+                    let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                    let share = shapes.cone(lane, d, distance) * shapes.over_distance(lane, law, distance);
+                    factor[lane] = visible[lane] * lit * share;
+                }
+            } else {
+                for lane in 0..LANES {
+                    let dx = chunk.position[0][lane] - y.x;
+                    let dy = chunk.position[1][lane] - y.y;
+                    let dz = chunk.position[2][lane] - y.z;
+                    let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                    let cosine = n.x * dx + n.y * dy + n.z * dz;
+                    let side = g.x * dx + g.y * dy + g.z * dz;
+                    let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                    factor[lane] = visible[lane] * lit * law.over_distance(distance);
+                }
+            }
+            for (sum, intensity) in sums.iter_mut().zip(&chunk.intensity) {
+                for lane in 0..LANES {
+                    sum[lane] += factor[lane] * intensity[lane];
+                }
+            }
+        }
+        let [r, g, b] = &sums;
+        horizontal_sums([r, g, b, &[0.0; LANES]]).truncate()
+    }
+
+    /// Tells `seen` of every chunk as seen from the point `x`.
+    #[inline(always)]
+    pub fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
+        with_falloff!(self.falloff, law => self.incident_with(x, law, incident));
+    }
+
+    #[inline(always)]
+    fn incident_with(&self, x: Vec3, law: impl FalloffLaw, incident: &mut impl IncidentLights) {
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let mut direction = [[0.0f32; LANES]; 3];
+            let mut reciprocal = [0.0f32; LANES];
+            if let Some(shapes) = &chunk.shapes {
+                for lane in 0..LANES {
+                    let d = chunk.to_light(lane, x.to_array());
+                    let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt().max(TINY_DISTANCE);
+                    (0..3).for_each(|axis| direction[axis][lane] = d[axis] / distance);
+                    let falloff = shapes.over_distance(lane, law, distance) * distance;
+                    reciprocal[lane] = falloff * shapes.cone(lane, d, distance);
+                }
+            } else {
+                for lane in 0..LANES {
+                    let dx = chunk.position[0][lane] - x.x;
+                    let dy = chunk.position[1][lane] - x.y;
+                    let dz = chunk.position[2][lane] - x.z;
+                    let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                    let inverse = 1.0 / distance;
+                    direction[0][lane] = dx * inverse;
+                    direction[1][lane] = dy * inverse;
+                    direction[2][lane] = dz * inverse;
+                    reciprocal[lane] = law.over_distance(distance) * distance;
+                }
+            }
+            incident.chunk(index, &direction, &reciprocal);
+        }
+    }
+}
+
+/// What is made of the lights as seen from a point.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+pub trait IncidentLights {
+    /// Takes a chunk: directions to its lights by axis, of unit length, and 1/φ1 times the cone's factor.
+    fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Directions and reciprocals of all chunks.
+    fn incident_at_the_origin(table: &PackedLights) -> Vec<([Lanes; 3], Lanes)> {
+        struct Seen(Vec<([Lanes; 3], Lanes)>);
+        impl IncidentLights for Seen {
+            fn chunk(&mut self, _: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
+                self.0.push((*direction, *reciprocal));
+            }
+        }
+        let mut seen = Seen(Vec::new());
+        table.incident_at(Vec3::ZERO, &mut seen);
+        seen.0
+    }
+
+    fn surface() -> SurfacePoint {
+        SurfacePoint::flat(Vec3::ZERO, Vec3::Y)
+    }
+
+    /// S(y) by hand: a light straight above at distance 2, one at 60° at distance 2, one below the plane.
+    #[test]
+    fn illumination_matches_hand_computed_numbers() {
+        let lights = [
+            PointLight::point(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
+            PointLight::point(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
+            PointLight::point(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
+        ];
+        // φ2/φ1: linear 1/(1+2) and 0.5/(1+2); inverse square 1/4 and 0.5/4; none 1 and 0.5.
+        for (falloff, expected) in [
+            (Falloff::Linear { constant: 1.0 }, Vec3::new(4.0, 3.0, 2.0)),
+            (Falloff::InverseSquare, Vec3::new(3.0, 2.25, 1.5)),
+            (Falloff::None, Vec3::new(12.0, 9.0, 6.0)),
+        ] {
+            let table = PackedLights::new(&lights, falloff, 0.0);
+            let sum = table.irradiance(&surface(), |_| Some([1.0; LANES]));
+            assert!(sum.abs_diff_eq(expected, 1e-5), "{falloff:?}: {sum} for {expected}");
+            assert_eq!(table.irradiance(&surface(), |_| None), Vec3::ZERO);
+        }
+    }
+
+    /// A light exactly at the lit point gives no NaN.
+    #[test]
+    fn a_light_at_the_point_is_finite() {
+        let light = PointLight::point(Vec3::ZERO, Vec3::ONE);
+        for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
+            let table = PackedLights::new(&[light], falloff, 0.0);
+            assert!(table.irradiance(&surface(), |_| Some([1.0; LANES])).is_finite());
+            for (direction, reciprocal) in incident_at_the_origin(&table) {
+                assert!(direction.iter().flatten().chain(&reciprocal).all(|v| v.is_finite()));
+            }
+        }
+    }
+
+    /// A spot light 2 above the point: full on its axis, a quarter half-way (in cosines) between the cones, nothing
+    /// beyond. A directional light has the cosine and no falloff, at any distance.
+    #[test]
+    fn spot_and_directional_lights_match_hand_computed_numbers() {
+        let above = Vec3::new(0.0, 2.0, 0.0);
+        let spot = |cosine: f32| PointLight {
+            position: above,
+            intensity: Vec3::splat(12.0),
+            shape: LightShape::Spot {
+                direction: Vec3::new((1.0 - cosine * cosine).sqrt(), -cosine, 0.0),
+                inner_cosine: 0.9,
+                outer_cosine: 0.5,
+            },
+        };
+        let direction = Vec3::new(3f32.sqrt() / 2.0, -0.5, 0.0);
+        let sun = PointLight {
+            position: above,
+            intensity: Vec3::splat(2.0),
+            shape: LightShape::Directional { direction },
+        };
+        // 12/2² = 3 on the axis; 3 · ((0.7 − 0.5)/(0.9 − 0.5))² = 3/4 at cosine 0.7; 2 · 0.5 from the sun.
+        for (light, expected) in [(spot(1.0), 3.0), (spot(0.7), 0.75), (spot(0.4), 0.0), (sun, 1.0)] {
+            let table = PackedLights::new(&[light], Falloff::InverseSquare, 100.0);
+            let sum = table.irradiance(&surface(), |_| Some([1.0; LANES]));
+            assert!(sum.abs_diff_eq(Vec3::splat(expected), 1e-5), "{light:?}: {sum} for {expected}");
+            let reciprocals = incident_at_the_origin(&table)[0].1[0];
+            let cosine = if matches!(light.shape, LightShape::Directional { .. }) { 0.5 } else { 1.0 };
+            assert!((light.intensity.x * reciprocals * cosine - expected).abs() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Last stage: from sums of radiance over the samples of pixels to pixels.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::tiles::{TILE, Tile};
+use super::trace::TilePaths;
+use crate::image::Image;
+
+/// Receives the tiles of an image as they are finished, each once, in any order and from any thread.
+pub trait TileSink: Sync {
+    /// A tile is finished: its pixels, row by row from the top left, linear RGB.
+    fn tile(&self, tile: &Tile, pixels: &[[f32; 3]]);
+}
+
+/// A sink that lets everything go.
+impl TileSink for () {
+    fn tile(&self, _: &Tile, _: &[[f32; 3]]) {}
+}
+
+/// Means over the samples of the pixels of a tile.
+pub fn resolve(radiance: &[Vec3], samples_per_pixel: u32) -> Vec<[f32; 3]> {
+    let scale = 1.0 / samples_per_pixel as f32;
+    radiance.iter().map(|sum| (*sum * scale).to_array()).collect()
+}
+
+/// Puts the pixels of a block of tiles, whose radiance is summed over the samples of each pixel, into an image.
+pub fn resolve_block(block: &[Tile], paths: &[TilePaths], samples_per_pixel: u32, image: &mut Image) {
+    let width = image.width() as usize;
+    let scale = 1.0 / samples_per_pixel as f32;
+    // Rows of tiles lie one after the other in the image, and in the block.
+    let rows_of_tiles = image.pixels_mut().par_chunks_mut(width * TILE as usize).enumerate();
+    rows_of_tiles.with_max_len(1).for_each(|(row, pixels)| {
+        let top = row as u32 * TILE;
+        let members = block.partition_point(|tile| tile.y < top)..block.partition_point(|tile| tile.y <= top);
+        for (tile, paths) in block[members.clone()].iter().zip(&paths[members]) {
+            let lines = pixels.chunks_mut(width).zip(paths.radiance.chunks(tile.width as usize));
+            for (line, values) in lines {
+                for (pixel, value) in line[tile.x as usize..].iter_mut().zip(values) {
+                    *pixel = (*value * scale).to_array();
+                }
+            }
+        }
+    });
+}

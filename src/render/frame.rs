@@ -1,0 +1,191 @@
+//! The stages of a frame, one after the other for each block of tiles: trace → need → evaluate → shade → film (method §9).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::RenderError;
+use super::film::{TileSink, resolve, resolve_block};
+use super::stats::{RenderStats, ShadeCounters, timed};
+use super::tiles::{TILES_PER_TASK, Tile, blocks};
+use super::trace::{PathVertex, TilePaths, trace_paths};
+use crate::accel::Accel;
+use crate::image::Image;
+use crate::scene::{Camera, CameraRays};
+use crate::settings::ViewSettings;
+use crate::world::World;
+
+/// What differs between the integrators.
+pub trait BlockIntegrator: Sync {
+    /// Evaluates what the surface points of a block need.
+    fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
+
+    /// Shades surface points of a tile: fills `light` with one E for each, such that k_d·E is the light sent back.
+    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters;
+}
+
+/// Stops a render between two tiles. Clones stop the same renders.
+#[derive(Clone, Debug, Default)]
+pub struct StopToken(std::sync::Arc<AtomicBool>);
+
+impl StopToken {
+    /// Stops the renders that were given this token or a clone of it.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether [`StopToken::stop`] was called.
+    pub fn is_stopped(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// # Errors
+    /// [`RenderError::Stopped`].
+    pub(super) fn check(&self) -> Result<(), RenderError> {
+        if self.is_stopped() { Err(RenderError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// Samples per block: enough to keep all threads busy and packets full, at some 70 bytes of path each.
+const BLOCK_SAMPLES: u64 = 1 << 20;
+
+/// Camera paths are kept until they are shaded up to this many samples per image, some two gigabytes; beyond, they are traced
+/// a second time, and counted twice.
+const KEPT_SAMPLES: u64 = 1 << 25;
+
+/// What is rendered: a view of a world, and who receives it.
+pub struct Frame<'a, A> {
+    /// The world.
+    pub world: World<'a, A>,
+    /// Its view.
+    pub view: &'a ViewSettings,
+    camera: CameraRays,
+    blocks: Vec<Vec<Tile>>,
+    sink: &'a dyn TileSink,
+    stop: &'a StopToken,
+    /// Camera paths that were traced already, by block.
+    kept: Vec<Vec<TilePaths>>,
+}
+
+impl<'a, A: Accel> Frame<'a, A> {
+    /// Cuts the view up.
+    pub fn new(
+        world: World<'a, A>,
+        camera: &Camera,
+        view: &'a ViewSettings,
+        sink: &'a dyn TileSink,
+        stop: &'a StopToken,
+    ) -> Self {
+        let camera = CameraRays::new(camera, view.resolution, view.samples_per_pixel);
+        let block_pixels = view.block_samples.unwrap_or(BLOCK_SAMPLES) / u64::from(view.samples_per_pixel);
+        let blocks = blocks(view.resolution, block_pixels);
+        Self { world, view, camera, blocks, sink, stop, kept: Vec::new() }
+    }
+
+    /// Traces the camera paths of a block; what `paths` held before is gone, but its memory is used again.
+    fn trace(
+        &self,
+        block: &[Tile],
+        paths: &mut Vec<TilePaths>,
+        stats: &mut RenderStats,
+    ) -> Result<(), RenderError> {
+        self.stop.check()?;
+        paths.resize_with(block.len(), TilePaths::default);
+        timed(&mut stats.seconds.paths, || {
+            let tiles = block.par_iter().zip(&mut *paths).with_max_len(TILES_PER_TASK);
+            tiles.for_each(|(tile, paths)| trace_paths(self.world, &self.camera, self.view, tile, paths));
+        });
+        for tile in &*paths {
+            stats.rays.camera += tile.camera_rays;
+            stats.rays.reflection += tile.reflection_rays;
+        }
+        Ok(())
+    }
+
+    /// Calls `each` with the camera paths of every block before any of them is shaded, for what has to be known of the whole
+    /// image at once.
+    ///
+    /// # Errors
+    /// [`RenderError::Stopped`].
+    pub fn trace_image(
+        &mut self,
+        stats: &mut RenderStats,
+        mut each: impl FnMut(&[TilePaths], &mut RenderStats),
+    ) -> Result<(), RenderError> {
+        let (width, height) = self.view.resolution;
+        let samples = u64::from(width) * u64::from(height) * u64::from(self.view.samples_per_pixel);
+        let keep = samples <= KEPT_SAMPLES;
+        let mut paths = Vec::new();
+        for block in &self.blocks {
+            self.trace(block, &mut paths, stats)?;
+            each(&paths, stats);
+            if keep {
+                self.kept.push(std::mem::take(&mut paths));
+            }
+        }
+        Ok(())
+    }
+
+    /// Renders block by block.
+    ///
+    /// # Errors
+    /// [`RenderError::Stopped`].
+    pub fn run(
+        mut self,
+        integrator: &mut impl BlockIntegrator,
+        stats: &mut RenderStats,
+    ) -> Result<Image, RenderError> {
+        let (width, height) = self.view.resolution;
+        let mut image = Image::new(width, height)?;
+        let mut kept = std::mem::take(&mut self.kept).into_iter();
+        // Kept from block to block: the first use of memory costs a sixth of the camera paths.
+        let mut paths: Vec<TilePaths> = Vec::new();
+        for block in &self.blocks {
+            match kept.next() {
+                Some(traced) => paths = traced,
+                None => self.trace(block, &mut paths, stats)?,
+            }
+            integrator.evaluate(&paths, stats);
+            let mut shade = stats.seconds.shade;
+            let counters = timed(&mut shade, || {
+                let counters = self.shade(integrator, block, &mut paths);
+                resolve_block(block, &paths, self.view.samples_per_pixel, &mut image);
+                counters
+            });
+            stats.seconds.shade = shade;
+            counters.into_iter().for_each(|counters| stats.add_shading(counters));
+            self.stop.check()?;
+        }
+        Ok(image)
+    }
+
+    /// Shades a block; tiles that are left when the render is stopped stay as they are.
+    fn shade(
+        &self,
+        integrator: &impl BlockIntegrator,
+        block: &[Tile],
+        paths: &mut [TilePaths],
+    ) -> Vec<ShadeCounters> {
+        let shade = |(tile, paths): (&Tile, &mut TilePaths)| {
+            if self.stop.is_stopped() {
+                return ShadeCounters::default();
+            }
+            let counters = shade_tile(integrator, tile, paths);
+            self.sink.tile(tile, &resolve(&paths.radiance, self.view.samples_per_pixel));
+            counters
+        };
+        block.par_iter().zip(paths).with_max_len(TILES_PER_TASK).map(shade).collect()
+    }
+}
+
+/// Adds the light that the vertices of a tile send towards the camera: eqs. (6) and (8), the sum over each path of
+/// weight · (Emiss + k_d · I), whose first part is there already.
+pub fn shade_tile(integrator: &impl BlockIntegrator, tile: &Tile, paths: &mut TilePaths) -> ShadeCounters {
+    let mut light = vec![Vec3::ZERO; paths.vertices.len()];
+    let counters = integrator.shade(tile, &paths.vertices, &mut light);
+    for (vertex, light) in paths.vertices.iter().zip(light) {
+        paths.radiance[vertex.pixel as usize] += vertex.reflectance * light;
+    }
+    counters
+}

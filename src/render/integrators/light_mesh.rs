@@ -1,0 +1,94 @@
+//! The light-mesh integrator: steps 4 to 11 of the paper's algorithm for a block of surface points.
+
+use glam::Vec3;
+use pulp::NullaryFnOnce;
+
+use super::hybrid::shade_hybrid;
+use crate::accel::Accel;
+use crate::light_mesh::lookup::LookupScratch;
+use crate::render::frame::BlockIntegrator;
+use crate::render::meshes::{LightMeshes, MeshShading};
+use crate::render::need::needed_points;
+use crate::render::stats::{RenderStats, ShadeCounters, timed};
+use crate::render::tiles::Tile;
+use crate::render::trace::{PathVertex, TilePaths};
+use crate::simd::vectorize;
+use crate::world::World;
+
+/// Shades by interpolation of light meshes. Indirect mesh points must be known; direct ones are evaluated block by block.
+pub struct LightMeshIntegrator<'a, A> {
+    /// What is shaded.
+    pub world: World<'a, A>,
+    /// Its light meshes.
+    pub meshes: &'a mut LightMeshes,
+    /// How they are read.
+    pub shading: &'a MeshShading,
+}
+
+/// Shading of a tile, as work for the best instruction set.
+struct Shade<'a, A> {
+    integrator: &'a LightMeshIntegrator<'a, A>,
+    tile: &'a Tile,
+    vertices: &'a [PathVertex],
+    light: &'a mut [Vec3],
+}
+
+impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
+    type Output = ShadeCounters;
+
+    #[inline(always)]
+    fn call(self) -> ShadeCounters {
+        let Self { integrator: LightMeshIntegrator { world, meshes, shading }, tile, vertices, light } = self;
+        let accel = world.accel;
+        let direct = meshes.direct.view(world.lights, &shading.direct);
+        let mut counters = ShadeCounters::default();
+        let mut scratch = LookupScratch::for_tile();
+        if shading.hybrid {
+            counters.shadow_rays = shade_hybrid(accel, direct, tile, vertices, &mut scratch, light);
+        } else {
+            let mut before = Vec3::NAN;
+            for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {
+                let surface = &vertex.surface;
+                let normal = surface.shading_normal;
+                let after = vertices.get(number + 1).map_or(Vec3::NAN, |next| next.surface.shading_normal);
+                *light = if normal == before || normal == after {
+                    direct.illumination_in_row(accel, surface, &mut scratch)
+                } else {
+                    direct.illumination(accel, surface, &mut scratch)
+                };
+                before = normal;
+            }
+        }
+        counters.shadow_rays += scratch.rays;
+        counters.direct_fallbacks = scratch.fallbacks;
+
+        light.iter_mut().for_each(|light| *light *= shading.direct_scale);
+        if let (Some(indirect), Some(view)) = (&meshes.indirect, &shading.indirect) {
+            let indirect = indirect.view(view);
+            let mut scratch = LookupScratch::for_tile();
+            for (vertex, light) in vertices.iter().zip(light) {
+                *light += indirect.illumination(accel, &vertex.surface, &mut scratch);
+            }
+            counters.shadow_rays += scratch.rays;
+            counters.indirect_fallbacks = scratch.fallbacks;
+        }
+        counters
+    }
+}
+
+impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
+    fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
+        let Self { world, meshes, shading } = self;
+        let mut seconds = stats.seconds.mesh;
+        timed(&mut seconds, || {
+            let needed = needed_points(paths, meshes.direct.view(world.lights, &shading.direct).lookup);
+            stats.mesh_points.direct.needed += needed.len();
+            stats.add_direct(meshes.direct.evaluate(*world, &shading.direct, &needed));
+        });
+        stats.seconds.mesh = seconds;
+    }
+
+    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, vertices, light })
+    }
+}

@@ -1,0 +1,116 @@
+//! The light meshes of a scene, and how one render reads them.
+
+use glam::Vec3;
+
+use crate::Bounds;
+use crate::light_mesh::direct::{DirectMesh, DirectShading};
+use crate::light_mesh::indirect::{DirectTransport, IndirectMesh, IndirectShadingView};
+use crate::light_mesh::points::MeshError;
+use crate::scene::Scene;
+use crate::settings::{
+    Estimator, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve, Settings,
+};
+
+/// Light meshes of a scene; they keep their values from one render to the next, whatever settings follow.
+///
+/// Known values are never changed. With several bounces of indirect light, points that a later view adds build on the
+/// final values of those that are there, so that views agree with first renders to within the tolerance, not to the bit.
+pub struct LightMeshes {
+    pub(super) direct: DirectMesh,
+    pub(super) indirect: Option<IndirectMesh>,
+    /// What the values of the indirect mesh follow from.
+    indirect_identity: Option<IndirectIdentity>,
+}
+
+/// What the values of an indirect mesh follow from beside geometry and materials: others make it another mesh.
+#[derive(Clone, Debug, PartialEq)]
+struct IndirectIdentity {
+    settings: IndirectSettings,
+    direct_points: PointSettings,
+    direct_kernel: KernelSettings,
+    estimator: Estimator,
+    direct_scale: f32,
+    /// How further bounces read the mesh itself.
+    shading: Option<IndirectShading>,
+    intensities: Vec<Vec3>,
+    background: Vec3,
+}
+
+impl IndirectIdentity {
+    fn of(settings: &Settings, scene: &Scene) -> Option<Self> {
+        let shading = &settings.shading;
+        let indirect = settings.mesh.indirect.clone()?;
+        Some(Self {
+            shading: (indirect.bounces > 1).then(|| shading.indirect.clone()),
+            direct_points: settings.mesh.direct.clone(),
+            direct_kernel: shading.kernel.clone(),
+            estimator: shading.estimator,
+            direct_scale: shading.direct_scale(),
+            intensities: scene.lights.iter().map(|light| light.intensity).collect(),
+            background: scene.background,
+            settings: indirect,
+        })
+    }
+}
+
+/// How one render reads the light meshes.
+pub struct MeshShading {
+    pub(super) direct: DirectShading,
+    pub(super) indirect: Option<IndirectShadingView>,
+    /// What I(y) is multiplied by before k_d.
+    pub(super) direct_scale: f32,
+    /// Whether lights on which mesh points disagree are traced.
+    pub(super) hybrid: bool,
+}
+
+impl MeshShading {
+    /// How surfaces send on direct light.
+    pub(super) fn transport(&self) -> DirectTransport<'_> {
+        DirectTransport { shading: &self.direct, scale: self.direct_scale }
+    }
+}
+
+impl LightMeshes {
+    /// Meshes over a scene of the given bounds, with no point known.
+    pub fn new(bounds: Bounds) -> Self {
+        Self { direct: DirectMesh::new(bounds), indirect: None, indirect_identity: None }
+    }
+
+    /// Makes the meshes ready to be read by these settings. Values stay, but for those of an indirect mesh that other settings
+    /// would have made.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub fn shading(&mut self, scene: &Scene, settings: &Settings) -> Result<MeshShading, MeshError> {
+        let shading = &settings.shading;
+        let direct = self.direct.shading(&settings.mesh.direct, &shading.kernel, shading.estimator)?;
+        let identity = IndirectIdentity::of(settings, scene);
+        if self.indirect_identity != identity {
+            let bounds = self.direct.store().points.bounds();
+            self.indirect =
+                settings.mesh.indirect.as_ref().map(|indirect| IndirectMesh::new(bounds, indirect));
+            self.indirect_identity = identity;
+        }
+        let indirect = match &mut self.indirect {
+            Some(mesh) => Some(mesh.shading(&shading.indirect)?),
+            None => None,
+        };
+        Ok(MeshShading {
+            direct,
+            indirect,
+            direct_scale: shading.direct_scale(),
+            hybrid: shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight,
+        })
+    }
+
+    /// Forgets what depends on the lights' intensities; visibility stays.
+    pub(super) fn forget_intensities(&mut self) {
+        self.direct.forget_intensities();
+        (self.indirect, self.indirect_identity) = (None, None);
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.direct.memory_bytes() + self.indirect.as_ref().map_or(0, IndirectMesh::memory_bytes)
+    }
+}

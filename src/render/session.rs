@@ -1,0 +1,238 @@
+//! A scene that is rendered more than once: everything that outlives a view.
+
+use glam::Vec3;
+
+use super::film::TileSink;
+use super::frame::{Frame, StopToken};
+use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
+use super::meshes::LightMeshes;
+use super::need::needed_points;
+use super::stats::{RenderStats, timed};
+use crate::accel::{Accel, Backend, BackendChoice, BackendError, with_accel};
+use crate::image::{Image, ImageError};
+use crate::light_mesh::direct::{Basis, DirectField};
+use crate::light_mesh::points::MeshError;
+use crate::light_mesh::store::PointMask;
+use crate::lights::{EmissiveTriangles, PackedLights};
+use crate::scene::{Camera, CameraError, Scene, SceneError};
+use crate::settings::{Integrator, Settings, SettingsError};
+use crate::world::World;
+
+/// A scene with its acceleration structure, lights and light meshes.
+///
+/// Light meshes keep what they know from one render to the next: another camera, radius, neighbourhood, estimator or leak rule,
+/// or another intensity of a light, costs only what was never evaluated.
+pub struct Session {
+    scene: Scene,
+    backend: Backend,
+    lights: PackedLights,
+    emissive: EmissiveTriangles,
+    meshes: LightMeshes,
+}
+
+/// Why a scene can't be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The scene contradicts itself.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// There is no acceleration structure.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+}
+
+/// Why there is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A camera that sees nothing.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A setting out of its range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The light meshes can't be set up.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The image can't be held.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A [`StopToken`] stopped the render.
+    #[error("the render was stopped")]
+    Stopped,
+}
+
+impl Session {
+    /// Checks a scene and builds its acceleration structure.
+    ///
+    /// # Errors
+    /// See [`SessionError`].
+    pub fn new(scene: Scene, backend: BackendChoice) -> Result<Self, SessionError> {
+        scene.validate()?;
+        let backend = Backend::build(backend, &scene)?.backend;
+        Ok(Self::of_valid(scene, backend))
+    }
+
+    /// The same with an acceleration structure that was built from the scene's geometry before.
+    ///
+    /// # Errors
+    /// [`SessionError::Scene`].
+    pub fn with_backend(scene: Scene, backend: Backend) -> Result<Self, SessionError> {
+        scene.validate()?;
+        Ok(Self::of_valid(scene, backend))
+    }
+
+    fn of_valid(scene: Scene, backend: Backend) -> Self {
+        let lights = PackedLights::of_scene(&scene);
+        let emissive = EmissiveTriangles::of_scene(&scene);
+        let meshes = LightMeshes::new(scene.bounds());
+        Self { scene, backend, lights, emissive, meshes }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Its acceleration structure.
+    pub fn backend(&self) -> &Backend {
+        &self.backend
+    }
+
+    /// Changes the intensity E_i of a light; 0 switches it off. What mesh points see stays known. Returns whether there is
+    /// such a light.
+    ///
+    /// # Errors
+    /// [`SceneError`] for an intensity that is negative or not finite; then nothing has changed.
+    pub fn set_intensity(&mut self, light: usize, intensity: Vec3) -> Result<bool, SceneError> {
+        let Some(changed) = self.scene.lights.get_mut(light) else { return Ok(false) };
+        let before = std::mem::replace(&mut changed.intensity, intensity);
+        if let Err(error) = changed.validate(light) {
+            changed.intensity = before;
+            return Err(error);
+        }
+        self.lights = PackedLights::of_scene(&self.scene);
+        self.meshes.forget_intensities();
+        Ok(true)
+    }
+
+    /// Renders a view.
+    ///
+    /// # Errors
+    /// See [`RenderError`].
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        self.render_to(camera, settings, &(), &StopToken::default())
+    }
+
+    /// Renders a view; `sink` receives its tiles as they are finished, `stop` ends it between two tiles.
+    ///
+    /// # Errors
+    /// See [`RenderError`]. The values of mesh points that were evaluated before an error stay known.
+    pub fn render_to(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        sink: &dyn TileSink,
+        stop: &StopToken,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        let Self { scene, backend, lights, emissive, meshes } = self;
+        with_accel!(&*backend, accel => {
+            let world = World { accel, scene, lights, emissive };
+            render_world(world, camera, settings, meshes, sink, stop)
+        })
+    }
+
+    /// DirectLight of eq. (1) at positions in free space, linear RGB, with the visibility of every light traced; needs no
+    /// surface and no normal.
+    pub fn direct_light(&self, positions: &[Vec3]) -> Vec<Vec3> {
+        let mut field = DirectField::default();
+        with_accel!(&self.backend, accel => field.trace(accel, &self.lights, positions));
+        field.derive(&self.lights, Basis::Light, positions);
+        (0..positions.len() as u32)
+            .map(|slot| {
+                let [r, g, b, ..] = *field.light(slot);
+                Vec3::new(r, g, b)
+            })
+            .collect()
+    }
+}
+
+/// Renders one view of a scene; what light meshes know is forgotten afterwards. `backend` must hold the scene.
+///
+/// # Errors
+/// See [`RenderError`]; the scene is not checked, as a [`Session`] does.
+pub fn render(
+    backend: &Backend,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+) -> Result<(Image, RenderStats), RenderError> {
+    let lights = PackedLights::of_scene(scene);
+    let emissive = EmissiveTriangles::of_scene(scene);
+    let mut meshes = LightMeshes::new(scene.bounds());
+    with_accel!(backend, accel => {
+        let world = World { accel, scene, lights: &lights, emissive: &emissive };
+        render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
+    })
+}
+
+fn render_world<A: Accel>(
+    world: World<A>,
+    camera: &Camera,
+    settings: &Settings,
+    meshes: &mut LightMeshes,
+    sink: &dyn TileSink,
+    stop: &StopToken,
+) -> Result<(Image, RenderStats), RenderError> {
+    settings.check()?;
+    camera.validate()?;
+    render_frame(Frame::new(world, camera, &settings.view, sink, stop), settings, meshes)
+}
+
+/// Renders with the integrator that the settings name.
+fn render_frame<A: Accel>(
+    mut frame: Frame<A>,
+    settings: &Settings,
+    meshes: &mut LightMeshes,
+) -> Result<(Image, RenderStats), RenderError> {
+    let mut stats = RenderStats::default();
+    let world = frame.world;
+    let image = match settings.shading.integrator {
+        Integrator::Conventional => {
+            let scale = settings.shading.direct_scale();
+            frame.run(&mut ConventionalIntegrator { world, scale }, &mut stats)?
+        }
+        Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
+        Integrator::LightMesh => {
+            let shading = meshes.shading(world.scene, settings)?;
+            let counters = &mut stats.mesh_points;
+            counters.direct.total = shading.direct.neighbourhoods.count(&meshes.direct.store().points);
+            if let (Some(mesh), Some(view)) = (&mut meshes.indirect, &shading.indirect) {
+                counters.indirect.total = view.neighbourhoods.count(&mesh.store().points);
+                // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
+                let mut needed = Vec::new();
+                frame.trace_image(&mut stats, |paths, stats| {
+                    timed(&mut stats.seconds.mesh, || {
+                        needed.extend(needed_points(paths, mesh.view(view).lookup).bricks());
+                    });
+                })?;
+                let mut seconds = stats.seconds.mesh;
+                timed(&mut seconds, || {
+                    let needed = PointMask::union(needed);
+                    stats.mesh_points.indirect.needed += needed.len();
+                    let transport = shading.transport();
+                    stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
+                });
+                stats.seconds.mesh = seconds;
+            }
+            let image =
+                frame.run(&mut LightMeshIntegrator { world, meshes, shading: &shading }, &mut stats)?;
+            stats.light_mesh_bytes = meshes.memory_bytes() as u64;
+            image
+        }
+    };
+    Ok((image, stats))
+}

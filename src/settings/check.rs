@@ -1,0 +1,120 @@
+//! What settings made in memory must fulfil; those of scene files and flags are checked where they are read.
+
+use super::{PointLayout, PointSettings, Radius, Settings, Spacing};
+use crate::image::MAX_PIXELS;
+
+/// A setting out of its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} must {range}, found {found}")]
+pub struct SettingsError {
+    /// Path of the field in [`Settings`].
+    pub name: &'static str,
+    /// The range, in words.
+    pub range: &'static str,
+    /// The value.
+    pub found: String,
+}
+
+fn check<T: std::fmt::Debug>(
+    name: &'static str,
+    range: &'static str,
+    found: T,
+    holds: bool,
+) -> Result<(), SettingsError> {
+    if holds { Ok(()) } else { Err(SettingsError { name, range, found: format!("{found:?}") }) }
+}
+
+fn is_length(length: f32) -> bool {
+    length > 0.0 && length.is_finite()
+}
+
+impl Settings {
+    /// Checks all ranges.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let Self { view, mesh, shading, .. } = self;
+        let (width, height) = view.resolution;
+        let pixels = u64::from(width) * u64::from(height);
+        check(
+            "view.resolution",
+            "have 1 to 2^28 pixels",
+            view.resolution,
+            (1..=MAX_PIXELS).contains(&pixels),
+        )?;
+        let one_or_more = |name, count: u32| check(name, "be at least 1", count, count >= 1);
+        one_or_more("view.samples_per_pixel", view.samples_per_pixel)?;
+        one_or_more("view.max_depth", view.max_depth)?;
+        one_or_more("shading.reference_samples", shading.reference_samples)?;
+        let threshold = view.weight_threshold;
+        check("view.weight_threshold", "be a number from 0 up", threshold, threshold >= 0.0)?;
+        let radius = |name, radius: Radius| {
+            let (Radius::Units(length) | Radius::Spacings(length)) = radius;
+            check(name, "be finite and above 0", length, is_length(length))
+        };
+        radius("shading.kernel.radius", shading.kernel.radius)?;
+        mesh.direct.check()?;
+        if let Some(indirect) = &mesh.indirect {
+            radius("shading.indirect.kernel.radius", shading.indirect.kernel.radius)?;
+            indirect.points.check()?;
+            one_or_more("mesh.indirect.directions", indirect.directions)?;
+            one_or_more("mesh.indirect.bounces", indirect.bounces)?;
+            let tolerance = indirect.tolerance;
+            check("mesh.indirect.tolerance", "be a number from 0 up", tolerance, tolerance >= 0.0)?;
+        }
+        Ok(())
+    }
+}
+
+impl PointSettings {
+    fn check(&self) -> Result<(), SettingsError> {
+        if let Spacing::Units(spacing) = self.spacing {
+            let holds = spacing.to_array().into_iter().all(is_length);
+            check("points.spacing", "be finite and above 0", spacing, holds)?;
+        }
+        if let PointLayout::List(positions) = &self.layout {
+            let holds = !positions.is_empty() && positions.iter().all(|position| position.is_finite());
+            check("points.layout", "list at least one position, all finite", positions.len(), holds)?;
+        }
+        for region in &self.regions {
+            let spacing = region.spacing.is_none_or(|spacing| spacing.to_array().into_iter().all(is_length));
+            let holds = spacing && region.radius.is_none_or(is_length) && !region.bounds.is_empty();
+            check("points.regions", "have a box and lengths above 0", region, holds)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::IndirectSettings;
+    use glam::Vec3;
+
+    /// Every kind of value that would make a render impossible is an error that names it.
+    #[test]
+    fn values_out_of_range_are_refused_by_name() {
+        assert_eq!(Settings::default().check(), Ok(()));
+        let refused = |change: &dyn Fn(&mut Settings)| {
+            let mut settings = Settings::default();
+            settings.mesh.indirect = Some(IndirectSettings::default());
+            change(&mut settings);
+            settings.check().expect_err("out of range").name
+        };
+        assert_eq!(refused(&|s| s.view.resolution = (0, 5)), "view.resolution");
+        assert_eq!(refused(&|s| s.view.samples_per_pixel = 0), "view.samples_per_pixel");
+        assert_eq!(refused(&|s| s.shading.reference_samples = 0), "shading.reference_samples");
+        assert_eq!(refused(&|s| s.shading.kernel.radius = Radius::Units(f32::NAN)), "shading.kernel.radius");
+        assert_eq!(refused(&|s| s.mesh.direct.spacing = Spacing::Units(Vec3::ZERO)), "points.spacing");
+        assert_eq!(
+            refused(&|s| s.mesh.direct.layout = PointLayout::List(Vec::new().into())),
+            "points.layout"
+        );
+        let indirect =
+            |change: fn(&mut IndirectSettings)| refused(&|s| s.mesh.indirect.iter_mut().for_each(change));
+        assert_eq!(indirect(|i| i.directions = 0), "mesh.indirect.directions");
+        assert_eq!(indirect(|i| i.bounces = 0), "mesh.indirect.bounces");
+        assert_eq!(indirect(|i| i.tolerance = f32::NAN), "mesh.indirect.tolerance");
+    }
+}

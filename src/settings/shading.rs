@@ -1,0 +1,165 @@
+//! How surface points are shaded. No change of these makes a known mesh point's visibility unknown.
+
+use super::named_enum;
+
+/// How surface points are shaded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShadingSettings {
+    /// What computes the illumination of a surface point.
+    pub integrator: Integrator,
+    /// With [`Integrator::Reference`]: positions in D_y at which the field is evaluated, at least 1.
+    pub reference_samples: u32,
+    /// Surfaces are Lambertian reflectors of albedo k_d, so that direct light counts k_d/π (method §12); otherwise k_d
+    /// alone, as in the paper.
+    pub lambertian: bool,
+    /// How direct illumination follows from the direct mesh.
+    pub estimator: Estimator,
+    /// With [`Estimator::PerLight`]: what happens to lights on which the points of D_y disagree.
+    pub resolve: Resolve,
+    /// D_y in the direct mesh.
+    pub kernel: KernelSettings,
+    /// How indirect light follows from the indirect mesh, if there is one.
+    pub indirect: IndirectShading,
+}
+
+impl Default for ShadingSettings {
+    fn default() -> Self {
+        Self {
+            integrator: Integrator::LightMesh,
+            reference_samples: 256,
+            lambertian: false,
+            estimator: Estimator::PerLight,
+            resolve: Resolve::Average,
+            kernel: KernelSettings::default(),
+            indirect: IndirectShading::default(),
+        }
+    }
+}
+
+impl ShadingSettings {
+    /// What I(y) is multiplied by before k_d: 1, or 1/π for Lambertian reflectors (method §12).
+    pub fn direct_scale(&self) -> f32 {
+        if self.lambertian { std::f32::consts::FRAC_1_PI } else { 1.0 }
+    }
+}
+
+/// How indirect light at a surface point follows from the indirect mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IndirectShading {
+    /// D_y in the indirect mesh.
+    pub kernel: KernelSettings,
+    /// Extrapolate the field to the surface, along its normal, instead of taking the mean over D_y, which is the field a few
+    /// tenths of R in front of it.
+    pub at_surface: bool,
+    /// Scale of Ĩ_d.
+    pub normalization: Normalization,
+}
+
+impl Default for IndirectShading {
+    fn default() -> Self {
+        Self { kernel: KernelSettings::default(), at_surface: false, normalization: Normalization::Mean }
+    }
+}
+
+/// The neighbourhood D_y, its weights, and which of its points count (method §3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct KernelSettings {
+    /// Radius R of D_y.
+    pub radius: Radius,
+    /// Shape and weights of D_y.
+    pub neighbourhood: Neighbourhood,
+    /// Drop points of D_y behind the tangent plane at y.
+    pub hemisphere: bool,
+    /// What keeps light from leaking through walls.
+    pub leaks: Leaks,
+}
+
+impl Default for KernelSettings {
+    fn default() -> Self {
+        Self {
+            radius: Radius::Spacings(2.0),
+            neighbourhood: Neighbourhood::SmoothSphere,
+            hemisphere: true,
+            leaks: Leaks::Visibility,
+        }
+    }
+}
+
+/// Radius of the interpolation neighbourhood, > 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Radius {
+    /// In scene units.
+    Units(f32),
+    /// In multiples of the largest of the three spacings.
+    Spacings(f32),
+}
+
+named_enum! {
+    /// What computes the illumination of a surface point (method §10).
+    pub enum Integrator {
+        /// Interpolation of light meshes
+        LightMesh = "light-mesh",
+        /// One occlusion ray per light at every surface point
+        Conventional = "conventional",
+        /// What a light mesh of infinite density would give, by dense sampling around every surface point; slow
+        Reference = "reference",
+    }
+}
+
+named_enum! {
+    /// What keeps light from leaking through walls, and darkness out of them.
+    pub enum Leaks {
+        /// All points of D_y count
+        Allow = "allow",
+        /// Points that see mostly back faces of one-sided surfaces lie inside of something and don't count
+        Invalidate = "invalidate",
+        /// Where the points of D_y disagree, only those count that the surface point sees
+        Visibility = "visibility",
+    }
+}
+
+named_enum! {
+    /// Shape and weights of D_y (method §3).
+    pub enum Neighbourhood {
+        /// The one nearest mesh point
+        Nearest = "nearest",
+        /// All points within R, equal weights: the paper's
+        Sphere = "sphere",
+        /// All points within R, weight (1 − r²/R²)²
+        SmoothSphere = "smooth-sphere",
+    }
+}
+
+named_enum! {
+    /// How direct illumination follows from the mesh (method §4).
+    pub enum Estimator {
+        /// Eq. (2) as printed; quadratic in the light intensities
+        Paper = "paper",
+        /// Mean of DirectLight over mean of the unoccluded DirectLight, times the sum without visibility
+        Ratio = "ratio",
+        /// Mean visibility of every light
+        PerLight = "per-light",
+        /// Irradiance by normal from second-order harmonics; its cost per pixel doesn't depend on the lights
+        Directional = "directional",
+    }
+}
+
+named_enum! {
+    /// What `per-light` does with lights on which the points of D_y disagree (method §4, hybrid shadows).
+    pub enum Resolve {
+        /// Their mean visibility: soft shadows
+        Average = "average",
+        /// One occlusion ray from the surface point: the sharp shadows of `conventional`
+        Trace = "trace",
+    }
+}
+
+named_enum! {
+    /// Scale of IndirectLight.
+    pub enum Normalization {
+        /// Mean over directions: the integral of eq. (4) over 4π
+        Mean = "mean",
+        /// The integral as printed
+        Integral = "integral",
+    }
+}

@@ -1,0 +1,37 @@
+//! What rays meet and what shines, together.
+
+use crate::accel::Accel;
+use crate::lights::{EmissiveTriangles, PackedLights};
+use crate::scene::Scene;
+
+/// A scene with what was built from it: the acceleration structure and the lights. Everything that traces takes one.
+pub struct World<'a, A> {
+    /// Answers rays.
+    pub accel: &'a A,
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its lights.
+    pub lights: &'a PackedLights,
+    /// Its triangles that emit.
+    pub emissive: &'a EmissiveTriangles,
+}
+
+// Derived, these would ask for a backend that can be copied.
+impl<A> Copy for World<'_, A> {}
+impl<A> Clone for World<'_, A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<'a, A: Accel> World<'a, A> {
+    /// The parts put together; they must be of one scene.
+    pub fn new(
+        accel: &'a A,
+        scene: &'a Scene,
+        lights: &'a PackedLights,
+        emissive: &'a EmissiveTriangles,
+    ) -> Self {
+        Self { accel, scene, lights, emissive }
+    }
+}
