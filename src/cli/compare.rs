@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::error::{CommandError, Outcome};
 use super::parse::{self, non_negative, positive};
-use crate::image::error_picture::error_picture;
+use crate::image::error_image::error_image;
 use crate::image::metrics::{self, Metrics, MetricsOptions};
 use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
 
@@ -150,7 +150,7 @@ pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Outcome, CommandEr
     let metrics = metrics::compare(&image, &reference, options).map_err(incomparable)?;
 
     if let Some(target) = error_target {
-        let colours = error_picture(&image, &reference, args.error_scale).map_err(incomparable)?;
+        let colours = error_image(&image, &reference, args.error_scale).map_err(incomparable)?;
         let scale =
             format!("mean of |A - B| over the channels; magma from 0 to {} of B's mean", args.error_scale);
         let metadata = [("Description".to_owned(), scale)];

@@ -45,7 +45,7 @@ pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<PointLigh
         let best = counted.reduce(|best, other| if other.0 > best.0 { other } else { best });
         let Some((1.., lamp)) = best else { break };
         dark.retain(|&position| !lights(lamp, position));
-        // An illuminance of 3 at the end of the reach; the exposure follows from the picture.
+        // An illuminance of 3 at the end of the reach; the exposure follows from the image.
         lamps.push(PointLight::point(lamp, Vec3::splat(3.0 * reach * reach)));
     }
     lamps

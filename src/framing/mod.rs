@@ -2,7 +2,7 @@
 //!
 //! A model that is looked at, such as a figure, is framed from outside. A model that is lived in, such as a room, shows
 //! nothing from outside: it is seen through its open side if it has one, from above if it has no ceiling, cut open if
-//! it is a maze, otherwise from where much of it is in view. Which of them it is, lines through the model tell.
+//! it is a maze, otherwise from where much of it is in view. Lines through the model decide which of them it is.
 
 mod inside;
 mod lamps;
@@ -94,7 +94,7 @@ const OPEN_ABOVE: (f32, f32, f32) = (0.5, 0.1, 0.2);
 
 /// Rooms that have nothing around them, if at least this share of what is seen from outside are backs.
 const BACKS_ONLY: f32 = 0.9;
-/// Rooms that no view from inside tells much about: no position sees this share of the others.
+/// Rooms of which no view from inside shows much: no position sees this share of the others.
 const SEEN_AT_ONCE: f32 = 0.5;
 
 /// `can_cull`: whether camera rays may be let through the backs of all materials.

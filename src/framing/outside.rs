@@ -92,7 +92,7 @@ fn share<A: Accel>(probe: &Probe<A>, camera: &Camera, holds: impl Fn(&Sight) -> 
     counted as f32 / seen.max(1) as f32
 }
 
-/// What a raster of rays sees, of which `look` is asked origin and direction.
+/// What a raster of rays sees; `look` takes the origin and the direction of a ray.
 fn looks(camera: &Camera, look: impl Fn(Vec3, Vec3) -> Option<Sight>) -> impl Iterator<Item = Sight> {
     let rays = CameraRays::new(camera, RASTER, 1);
     let pixels = (0..RASTER.1).flat_map(|y| (0..RASTER.0).map(move |x| (x, y)));

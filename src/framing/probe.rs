@@ -8,9 +8,9 @@ use crate::sampling::SphereStrata;
 use crate::sampling::SplitMix64;
 use crate::scene::{Interaction, LightShape, Ray, Scene};
 
-/// A scene that rays can ask.
+/// A scene that rays explore.
 pub struct Probe<'a, A> {
-    /// Answers the rays.
+    /// Traces the rays.
     pub accel: &'a A,
     /// What they meet.
     pub scene: &'a Scene,
@@ -29,12 +29,12 @@ pub struct Sight {
     pub far: Vec3,
     /// Normal of the side that was seen.
     pub normal: Vec3,
-    /// Whether that is the front. Two-sided materials don't matter: the winding tells the inside of a thing from its
-    /// outside.
+    /// Whether that is the front. Two-sided materials don't matter: the winding decides what is the inside of a
+    /// thing.
     pub front: bool,
 }
 
-/// What lines through the model tell.
+/// What lines through the model found.
 pub struct Rooms {
     /// Lines that met the model.
     lines: usize,
@@ -56,7 +56,7 @@ impl Rooms {
 
 /// Random lines through the model.
 const LINES: u32 = 256;
-/// Surfaces that a line may meet: more tell nothing new.
+/// Surfaces that a line may meet: more find nothing new.
 const SURFACES: usize = 64;
 /// Directions around a position.
 const DIRECTIONS: u32 = 48;
@@ -164,15 +164,15 @@ impl<A: Accel> Probe<'_, A> {
     /// Share of the directions above a surface that end on other surfaces.
     pub fn shelter(&self, sight: &Sight) -> f32 {
         let strata = SphereStrata::new(DIRECTIONS);
-        let (mut asked, mut blocked) = (0, 0);
+        let (mut above, mut blocked) = (0, 0);
         for cell in 0..DIRECTIONS {
             let direction = strata.jittered(cell, sight.near);
             if direction.dot(sight.normal) > 0.0 {
-                asked += 1;
+                above += 1;
                 blocked += u32::from(self.accel.occluded(&Ray::new(sight.near, direction)));
             }
         }
-        blocked as f32 / asked.max(1) as f32
+        blocked as f32 / above.max(1) as f32
     }
 
     /// Whether the light that would be strongest at a surface reaches it; true without lights.

@@ -1,8 +1,8 @@
-//! What can go wrong with pictures.
+//! What can go wrong with images.
 
 use std::path::PathBuf;
 
-/// A picture that cannot be built, read or written.
+/// An image that cannot be built, read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -24,7 +24,7 @@ pub enum ImageError {
         /// What the operating system says.
         source: std::io::Error,
     },
-    /// A file was read, but its contents are no picture this library understands.
+    /// A file was read, but its contents are no image this library understands.
     #[error("{}: {source}", path.display())]
     Contents {
         /// The file.
@@ -32,7 +32,7 @@ pub enum ImageError {
         /// What is wrong with it.
         source: DecodeError,
     },
-    /// A picture could not be turned into a file's bytes.
+    /// An image could not be turned into a file's bytes.
     #[error("cannot encode {}: {cause}", path.display())]
     Encode {
         /// The file that was to be written.
@@ -50,7 +50,7 @@ pub enum ImageError {
     },
 }
 
-/// Why the bytes of a picture file were refused.
+/// Why the bytes of an image file were refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {

@@ -18,7 +18,7 @@ use super::{DecodeError, Image, MAX_PIXELS};
 pub(crate) const SIGNATURE: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// A file of n bytes may claim `FREE_PIXELS` + n · `PIXELS_PER_BYTE` pixels. Deflate, at most 1,032 bytes out of one,
-/// and at least 2 bytes per pixel stay below it; a small file that claims a huge picture does not.
+/// and at least 2 bytes per pixel stay below it; a small file that claims a huge image does not.
 const FREE_PIXELS: u64 = 1 << 24;
 const PIXELS_PER_BYTE: u64 = 1024;
 
@@ -165,7 +165,7 @@ fn decode_layer(bytes: &[u8]) -> Result<Image, DecodeError> {
         copy_block(&block, &channels, &selection, placement, &mut image);
     }
     if area != expected_area {
-        return Err(damaged("blocks of the picture are missing"));
+        return Err(damaged("blocks of the image are missing"));
     }
     Ok(image)
 }
@@ -210,7 +210,7 @@ fn select_rgb(channels: &ChannelList) -> Option<Selection> {
     })
 }
 
-/// The channel Y, unless chroma channels say that it is one part of a coloured picture.
+/// The channel Y, unless chroma channels say that it is one part of a coloured image.
 fn select_luminance(channels: &ChannelList) -> Option<Selection> {
     let has = |wanted: &str| channels.list.iter().any(|channel| channel.name == *wanted);
     if !has("Y") || has("RY") || has("BY") {

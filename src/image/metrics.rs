@@ -1,6 +1,6 @@
-//! How far a picture is from a reference.
+//! How far an image is from a reference.
 //!
-//! All sums run over pixels that are finite in both pictures; the others are counted and left out.
+//! All sums run over pixels that are finite in both images; the others are counted and left out.
 
 use super::tone::tone_map;
 use super::{Image, is_finite};
@@ -9,18 +9,18 @@ use super::{Image, is_finite};
 const BLOCK: usize = 8;
 
 /// Relative errors divide by at least this share of the reference's mean, so that a pixel that is black in the
-/// reference counts in proportion to the picture and not by a division by almost zero.
+/// reference counts in proportion to the image and not by a division by almost zero.
 const DARKEST: f64 = 0.01;
 
-/// Two pictures that cannot be compared.
+/// Two images that cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MetricsError {
     /// The sides differ.
-    #[error("the pictures differ in size: {}x{} and {}x{} pixels", .0.0, .0.1, .1.0, .1.1)]
+    #[error("the images differ in size: {}x{} and {}x{} pixels", .0.0, .0.1, .1.0, .1.1)]
     Sizes((u32, u32), (u32, u32)),
 }
 
-/// How the pictures are compared.
+/// How the images are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MetricsOptions {
     /// Exposure in stops of the tone mapping before PSNR and FLIP.
@@ -41,7 +41,7 @@ pub struct MaxDifference {
     pub channel: usize,
 }
 
-/// Differences between a picture and its reference. `None` where a number is not defined.
+/// Differences between an image and its reference. `None` where a number is not defined.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metrics {
     /// Root of the mean squared difference over all channels, linear.
@@ -53,10 +53,10 @@ pub struct Metrics {
     /// The same of means of 8×8-pixel blocks, in which the noise of path-traced references averages out. Blocks
     /// cut by the right and lower edge count by their pixels.
     pub block_mean_relative_error: Option<f64>,
-    /// Peak signal-to-noise ratio in dB of the tone-mapped pictures (not rounded to 8 bits), peak 1; undefined
+    /// Peak signal-to-noise ratio in dB of the tone-mapped images (not rounded to 8 bits), peak 1; undefined
     /// if these are equal.
     pub psnr: Option<f64>,
-    /// Mean FLIP error of the tone-mapped 8-bit pictures at 67 pixels per degree: 0 equal, 1 black against white.
+    /// Mean FLIP error of the tone-mapped 8-bit images at 67 pixels per degree: 0 equal, 1 black against white.
     /// Undefined above 2²⁵ pixels and without the feature `flip`.
     pub flip: Option<f64>,
     /// The largest difference; undefined without finite pixels.
@@ -64,11 +64,11 @@ pub struct Metrics {
     /// Pixels that differ by [`MetricsOptions::threshold`], those counted as not finite included unless their
     /// bits are equal.
     pub differing_pixels: u64,
-    /// Pixels of the picture with a NaN or infinite channel.
+    /// Pixels of the image with a NaN or infinite channel.
     pub non_finite_pixels: u64,
     /// The same of the reference.
     pub reference_non_finite_pixels: u64,
-    /// Mean of all channels of the picture over the pixels compared.
+    /// Mean of all channels of the image over the pixels compared.
     pub mean: Option<f64>,
     /// The same of the reference.
     pub reference_mean: Option<f64>,
@@ -123,7 +123,7 @@ pub fn compare(image: &Image, reference: &Image, options: MetricsOptions) -> Res
     })
 }
 
-/// Refuses pictures of different sizes.
+/// Refuses images of different sizes.
 pub(super) fn check_sizes(image: &Image, reference: &Image) -> Result<(), MetricsError> {
     let size = |image: &Image| (image.width(), image.height());
     if size(image) == size(reference) {
@@ -137,7 +137,7 @@ fn to_f64(pixel: &[f32; 3]) -> [f64; 3] {
     pixel.map(f64::from)
 }
 
-/// `a / b`, where 0 / 0 is 0 (equal pictures have no error) and anything else over 0 is undefined.
+/// `a / b`, where 0 / 0 is 0 (equal images have no error) and anything else over 0 is undefined.
 fn ratio(a: f64, b: f64) -> Option<f64> {
     if a == 0.0 { Some(0.0) } else { Some(a / b).filter(|quotient| quotient.is_finite()) }
 }
@@ -207,7 +207,7 @@ fn differ(a: &[f32; 3], b: &[f32; 3], threshold: Option<f64>) -> bool {
     }
 }
 
-/// Mean FLIP error, or `None` for pictures too large for it. Pixels that are not finite in one picture are black
+/// Mean FLIP error, or `None` for images too large for it. Pixels that are not finite in one image are black
 /// in both.
 #[cfg(feature = "flip")]
 fn flip(image: &Image, reference: &Image, exposure: f32) -> Option<f64> {
@@ -241,7 +241,7 @@ fn flip(_: &Image, _: &Image, _: f32) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn image(width: u32, height: u32, pixels: &[[f32; 3]]) -> Image {
+    fn make(width: u32, height: u32, pixels: &[[f32; 3]]) -> Image {
         Image::from_pixels(width, height, pixels.to_vec()).unwrap()
     }
 
@@ -254,9 +254,9 @@ mod tests {
     /// 4.5 / 6 = 0.75. Relative: 0.5 / 3 and 0.25 / 1.5, both 1/6.
     #[test]
     fn errors_agree_with_sums_by_hand() {
-        let reference = image(2, 1, &[[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]]);
-        let picture = image(2, 1, &[[1.5, 1.0, 1.0], [0.5, 0.5, 0.25]]);
-        let metrics = compare(&picture, &reference, MetricsOptions::default()).unwrap();
+        let reference = make(2, 1, &[[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]]);
+        let image = make(2, 1, &[[1.5, 1.0, 1.0], [0.5, 0.5, 0.25]]);
+        let metrics = compare(&image, &reference, MetricsOptions::default()).unwrap();
         let rmse = (0.3125_f64 / 6.0).sqrt();
         close(metrics.rmse, rmse);
         close(metrics.relative_rmse, rmse / 0.75);
@@ -270,17 +270,17 @@ mod tests {
 
     /// Tone-mapped, 0 against 1 in one of twelve samples: −10 log10(1/12) = 10.79 dB; what is above 1 is clamped.
     #[test]
-    fn psnr_is_that_of_the_displayed_picture() {
-        let reference = image(2, 2, &[[0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
-        let picture = image(2, 2, &[[1.0, 0.0, 0.0], [5.0; 3], [1.0; 3], [-1.0; 3]]);
-        let metrics = compare(&picture, &reference, MetricsOptions::default()).unwrap();
+    fn psnr_is_that_of_the_displayed_image() {
+        let reference = make(2, 2, &[[0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
+        let image = make(2, 2, &[[1.0, 0.0, 0.0], [5.0; 3], [1.0; 3], [-1.0; 3]]);
+        let metrics = compare(&image, &reference, MetricsOptions::default()).unwrap();
         close(metrics.psnr, 10.0 * 12.0_f64.log10());
     }
 
     #[test]
-    fn equal_pictures_have_no_error_even_if_black() {
+    fn equal_images_have_no_error_even_if_black() {
         for value in [0.0, 0.7] {
-            let same = image(9, 1, &[[value; 3]; 9]);
+            let same = make(9, 1, &[[value; 3]; 9]);
             let metrics = compare(&same, &same, MetricsOptions::default()).unwrap();
             let zeros = [metrics.rmse, metrics.relative_rmse, metrics.mean_relative_error];
             assert_eq!(zeros, [Some(0.0); 3]);
@@ -292,43 +292,43 @@ mod tests {
     #[test]
     fn errors_relative_to_a_black_reference_are_undefined() {
         let metrics =
-            compare(&image(1, 1, &[[1.0; 3]]), &image(1, 1, &[[0.0; 3]]), MetricsOptions::default()).unwrap();
+            compare(&make(1, 1, &[[1.0; 3]]), &make(1, 1, &[[0.0; 3]]), MetricsOptions::default()).unwrap();
         close(metrics.rmse, 1.0);
         assert_eq!((metrics.relative_rmse, metrics.mean_relative_error), (None, None));
     }
 
     /// The reference's mean is 0.5, a hundredth of it 0.005: 0.001 against black is an error of 0.2 in that pixel.
     #[test]
-    fn black_pixels_count_in_proportion_to_the_picture() {
-        let reference = image(2, 1, &[[0.0; 3], [1.0; 3]]);
-        let picture = image(2, 1, &[[0.001; 3], [1.0; 3]]);
-        let metrics = compare(&picture, &reference, MetricsOptions::default()).unwrap();
+    fn black_pixels_count_in_proportion_to_the_image() {
+        let reference = make(2, 1, &[[0.0; 3], [1.0; 3]]);
+        let image = make(2, 1, &[[0.001; 3], [1.0; 3]]);
+        let metrics = compare(&image, &reference, MetricsOptions::default()).unwrap();
         close(metrics.mean_relative_error, 0.1);
     }
 
     /// Noise of ±0.5 that cancels in each 8×8 block is no error of the block means, also not in the cut block.
     #[test]
     fn noise_averages_out_in_block_means() {
-        let reference = image(10, 8, &[[1.0; 3]; 80]);
+        let reference = make(10, 8, &[[1.0; 3]; 80]);
         let noisy: Vec<[f32; 3]> = (0..80).map(|i| [if i % 2 == 0 { 0.5 } else { 1.5 }; 3]).collect();
-        let metrics = compare(&image(10, 8, &noisy), &reference, MetricsOptions::default()).unwrap();
+        let metrics = compare(&make(10, 8, &noisy), &reference, MetricsOptions::default()).unwrap();
         assert_eq!(metrics.block_mean_relative_error, Some(0.0));
         close(metrics.mean_relative_error, 0.5);
     }
 
     #[test]
     fn non_finite_pixels_are_counted_and_left_out() {
-        let reference = image(4, 1, &[[1.0; 3], [1.0; 3], [f32::INFINITY; 3], [1.0; 3]]);
-        let picture = image(4, 1, &[[1.5; 3], [1.0, f32::NAN, 1.0], [1.0; 3], [1.0; 3]]);
-        let metrics = compare(&picture, &reference, MetricsOptions::default()).unwrap();
+        let reference = make(4, 1, &[[1.0; 3], [1.0; 3], [f32::INFINITY; 3], [1.0; 3]]);
+        let image = make(4, 1, &[[1.5; 3], [1.0, f32::NAN, 1.0], [1.0; 3], [1.0; 3]]);
+        let metrics = compare(&image, &reference, MetricsOptions::default()).unwrap();
         assert_eq!((metrics.non_finite_pixels, metrics.reference_non_finite_pixels), (1, 1));
         close(metrics.rmse, 0.125_f64.sqrt());
         assert_eq!(metrics.max.unwrap().pixel, (0, 0));
         assert_eq!(metrics.differing_pixels, 3);
 
         let nothing = compare(
-            &image(1, 1, &[[f32::NAN; 3]]),
-            &image(1, 1, &[[1.0; 3]]),
+            &make(1, 1, &[[f32::NAN; 3]]),
+            &make(1, 1, &[[1.0; 3]]),
             MetricsOptions { threshold: Some(10.0), ..MetricsOptions::default() },
         )
         .unwrap();
@@ -339,10 +339,10 @@ mod tests {
     /// The reference's mean is 1: differences of 0.01 and 0.03 lie on both sides of 2 %.
     #[test]
     fn the_threshold_is_a_share_of_the_references_mean() {
-        let reference = image(3, 1, &[[1.0; 3]; 3]);
-        let picture = image(3, 1, &[[1.0; 3], [1.01; 3], [1.0, 1.0, 1.03]]);
+        let reference = make(3, 1, &[[1.0; 3]; 3]);
+        let image = make(3, 1, &[[1.0; 3], [1.01; 3], [1.0, 1.0, 1.03]]);
         let count = |threshold| {
-            compare(&picture, &reference, MetricsOptions { threshold, ..MetricsOptions::default() })
+            compare(&image, &reference, MetricsOptions { threshold, ..MetricsOptions::default() })
                 .unwrap()
                 .differing_pixels
         };
@@ -350,17 +350,17 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_different_sizes_are_not_compared() {
+    fn images_of_different_sizes_are_not_compared() {
         let error =
-            compare(&image(2, 1, &[[0.0; 3]; 2]), &image(1, 2, &[[0.0; 3]; 2]), MetricsOptions::default());
+            compare(&make(2, 1, &[[0.0; 3]; 2]), &make(1, 2, &[[0.0; 3]; 2]), MetricsOptions::default());
         assert_eq!(error, Err(MetricsError::Sizes((2, 1), (1, 2))));
     }
 
-    /// FLIP is 0 for equal pictures, and close to 1, its largest value, for black against white.
+    /// FLIP is 0 for equal images, and close to 1, its largest value, for black against white.
     #[cfg(feature = "flip")]
     #[test]
     fn flip_spans_from_equal_to_black_against_white() {
-        let (black, white) = (image(32, 32, &[[0.0; 3]; 1024]), image(32, 32, &[[1.0; 3]; 1024]));
+        let (black, white) = (make(32, 32, &[[0.0; 3]; 1024]), make(32, 32, &[[1.0; 3]; 1024]));
         let flip = |a, b| compare(a, b, MetricsOptions::default()).unwrap().flip.unwrap();
         assert_eq!(flip(&white, &white), 0.0);
         assert!(flip(&black, &white) > 0.95);

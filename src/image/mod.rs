@@ -1,22 +1,22 @@
-//! Pictures: linear RGB in memory, EXR and PNG on disk, and how far two of them are apart.
+//! Images: linear RGB in memory, EXR and PNG on disk, and how far two of them are apart.
 
 mod error;
-pub mod error_picture;
+pub mod error_image;
 pub mod exr;
+mod input;
 pub mod metrics;
 pub mod output;
 pub mod png;
 pub mod tone;
 
-use std::path::Path;
-
 pub use error::{DecodeError, ImageError};
+pub use input::{decode, read};
 pub use output::{ImageFormat, ImageOptions, OutputFile, OutputTarget};
 
 /// Largest number of pixels of an image, 2²⁸: 3 GiB of linear RGB.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// A picture in linear RGB with BT.709 primaries, row-major from the top left.
+/// An image in linear RGB with BT.709 primaries, row-major from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     width: u32,
@@ -106,32 +106,6 @@ fn checked_area(width: u32, height: u32) -> Result<usize, ImageError> {
     match usize::try_from(area) {
         Ok(count) if (1..=MAX_PIXELS).contains(&area) => Ok(count),
         _ => Err(ImageError::Size { width, height, pixels: 0 }),
-    }
-}
-
-/// Reads an EXR or PNG file; which one it is, its first bytes tell.
-///
-/// # Errors
-///
-/// If the file cannot be read, is damaged, or holds no RGB or grey picture.
-pub fn read(path: &Path) -> Result<Image, ImageError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| ImageError::Read { path: path.to_path_buf(), source })?;
-    decode(&bytes).map_err(|source| ImageError::Contents { path: path.to_path_buf(), source })
-}
-
-/// Reads the bytes of an EXR or PNG file.
-///
-/// # Errors
-///
-/// As [`read`].
-pub fn decode(bytes: &[u8]) -> Result<Image, DecodeError> {
-    if bytes.starts_with(&exr::SIGNATURE) {
-        exr::decode(bytes)
-    } else if bytes.starts_with(&png::SIGNATURE) {
-        png::decode(bytes)
-    } else {
-        Err(DecodeError::UnknownFormat)
     }
 }
 

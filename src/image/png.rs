@@ -47,7 +47,7 @@ pub fn encode_rgb8(
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
-    // Balanced compression saves a quarter of the bytes, and takes twenty times as long: longer than to render the picture.
+    // Balanced compression saves a quarter of the bytes, and takes twenty times as long: longer than to render the image.
     encoder.set_compression(Compression::Fast);
     for (key, value) in metadata {
         // tEXt holds Latin-1 only; the newer iTXt holds everything, but fewer programs show it.

@@ -90,3 +90,57 @@ impl MaskedMesh {
         mask.is_none_or(|mask| mask.is_opaque(self.mesh.uv(triangle, u, v)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Texture, TriangleMaterials, Wrap};
+    use glam::Affine2;
+
+    /// Opaque in the left half of the texture only.
+    fn left_half() -> AlphaMask {
+        let texture = Texture::new(2, 1, vec![[0, 0, 0, 255], [0; 4]]).unwrap();
+        let map =
+            TextureMap { texture: Arc::new(texture), transform: Affine2::IDENTITY, wrap: [Wrap::Clamp; 2] };
+        AlphaMask { map: Some(map), alpha: 1.0, cutoff: 0.5 }
+    }
+
+    /// Material 0 is solid, material 1 is not; the texture coordinates are the barycentric ones.
+    fn scene(materials: TriangleMaterials) -> Scene {
+        let mesh = TriangleMesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]; 2]);
+        let uvs = Some(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        let mut scene = Scene::new();
+        scene.add_material(Material { alpha_mask: Some(left_half()), ..Material::default() });
+        scene.add(TriangleMesh { materials, uvs, ..mesh });
+        scene
+    }
+
+    /// Filters cost time in every query, so that meshes that are solid must have none.
+    #[test]
+    fn only_meshes_with_a_masked_triangle_have_masks() {
+        let masked = |materials: TriangleMaterials| {
+            let scene = scene(materials);
+            AlphaMasks::of_scene(&scene).of_mesh(&scene.meshes[0])
+        };
+        assert!(masked(TriangleMaterials::Uniform(0)).is_none());
+        assert!(masked(TriangleMaterials::PerTriangle(vec![0, 0])).is_none());
+        assert!(masked(TriangleMaterials::Uniform(1)).is_some());
+        assert!(masked(TriangleMaterials::PerTriangle(vec![0, 1])).is_some());
+    }
+
+    /// The scene and what acceleration structures keep of it answer alike.
+    #[test]
+    fn a_masked_triangle_is_opaque_where_its_material_is() {
+        let scene = scene(TriangleMaterials::PerTriangle(vec![0, 1]));
+        let masked = AlphaMasks::of_scene(&scene).of_mesh(&scene.meshes[0]).unwrap();
+        for (triangle, u, opaque) in [(0, 0.25, true), (0, 0.75, true), (1, 0.25, true), (1, 0.75, false)] {
+            assert_eq!(masked.is_opaque(triangle, u, 0.1), opaque, "triangle {triangle} at {u}");
+            assert_eq!(
+                scene.is_opaque(&scene.meshes[0], triangle, u, 0.1),
+                opaque,
+                "triangle {triangle} at {u}"
+            );
+        }
+        assert_eq!(left_half(), left_half());
+    }
+}

@@ -1,4 +1,4 @@
-//! Textures: pictures that vary a material over a surface.
+//! Textures: images that vary a material over a surface.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use glam::{Affine2, Vec2, Vec3};
 
 use crate::color::linear_from_srgb;
 
-/// Picture with colours and coverage, 8 bits each as in the file; colours are sRGB-encoded.
+/// Image with colours and coverage, 8 bits each as in the file; colours are sRGB-encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     width: u32,
@@ -17,10 +17,10 @@ pub struct Texture {
 /// What happens to texture coordinates outside of [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The picture repeats.
+    /// The image repeats.
     #[default]
     Repeat,
-    /// The picture repeats, every other time mirrored.
+    /// The image repeats, every other time mirrored.
     Mirror,
     /// The border's texels go on.
     Clamp,
@@ -29,16 +29,16 @@ pub enum Wrap {
 /// A texture as a material uses it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureMap {
-    /// The picture.
+    /// The image.
     pub texture: Arc<Texture>,
-    /// Applied to the vertices' texture coordinates; (0, 0) is the picture's upper left corner after that.
+    /// Applied to the vertices' texture coordinates; (0, 0) is the image's upper left corner after that.
     pub transform: Affine2,
-    /// Outside of the picture, by axis.
+    /// Outside of the image, by axis.
     pub wrap: [Wrap; 2],
 }
 
 impl Texture {
-    /// Picture of `width` · `height` RGBA texels, rows from the top; `None` if their number differs or is 0.
+    /// Image of `width` · `height` RGBA texels, rows from the top; `None` if their number differs or is 0.
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
         (count > 0 && texels.len() as u64 == count).then_some(Self { width, height, texels })
@@ -49,7 +49,7 @@ impl Texture {
         self.texels.iter().any(|texel| texel[3] != u8::MAX)
     }
 
-    /// The same picture with the grey value (the red channel) of another one as coverage, resampled where sizes differ.
+    /// The same image with the grey value (the red channel) of another one as coverage, resampled where sizes differ.
     pub fn with_coverage(&self, coverage: &Self) -> Self {
         let scale = |at: u32, from: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(from)) as u32;
         let mut texels = self.texels.clone();

@@ -207,7 +207,7 @@ impl Plan {
         let half = self.half_extent();
         let Forest { triangles, lights, seed } = self.forest;
         // With linear falloff the light that reaches a point grows with the forest's extent; this keeps
-        // the picture's brightness.
+        // the image's brightness.
         let total = 1.6 * (half.x + half.y);
         let front = half.y;
         format!(

@@ -1,4 +1,4 @@
-//! Scenes made by rule, for benchmarks and pictures.
+//! Scenes made by rule, for benchmarks and images.
 
 mod files;
 pub mod forest;
@@ -9,7 +9,7 @@ pub mod still_life;
 use std::io;
 use std::path::PathBuf;
 
-pub use files::write_files;
+use files::write_files;
 
 /// Why a scene could not be generated.
 #[derive(Debug, thiserror::Error)]

@@ -61,7 +61,7 @@ impl OpenedScene {
 /// Parts of the scene's diagonal between mesh points: at most, without knowledge of the lights, and at least.
 const SPACING_RANGE: [f32; 3] = [1.0 / 80.0, 1.0 / 120.0, 1.0 / 400.0];
 /// Lights whose nearest neighbour is looked for.
-const LIGHTS_ASKED: usize = 1000;
+const NEIGHBOURS: usize = 1000;
 
 /// Distance between mesh points: a quarter of the distance between neighbouring lights, within a range that follows
 /// from the scene's size. Shadow edges are traced, so that it decides on speed more than on sharpness.
@@ -75,7 +75,7 @@ fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
         .iter()
         .filter(|light| !matches!(light.shape, LightShape::Directional { .. }))
         .map(|light| light.position)
-        .take(LIGHTS_ASKED)
+        .take(NEIGHBOURS)
         .collect();
     let mut nearest: Vec<f32> = local
         .iter()

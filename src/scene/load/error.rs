@@ -1,4 +1,4 @@
-//! What can go wrong while a scene is read, and what is merely worth telling.
+//! What can go wrong while a scene is read, and what is merely worth a warning.
 
 use std::fmt;
 use std::io;
@@ -51,7 +51,7 @@ pub enum LoadError {
         /// What is wrong.
         problem: String,
     },
-    /// A part of a file that has no lines breaks the format's rules, or asks for what is not supported.
+    /// A part of a file that has no lines breaks the format's rules, or needs what is not supported.
     #[error("{}: {}{problem}", file.display(), place_clause(place))]
     Invalid {
         /// The file.
@@ -87,7 +87,7 @@ pub enum LoadError {
     },
 }
 
-/// The system's message without "(os error N)", which tells a user nothing.
+/// The system's message without "(os error N)", which means nothing to a user.
 fn reason(error: &io::Error) -> String {
     let text = error.to_string();
     match text.find(" (os error") {

@@ -4,22 +4,22 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::obj::text::{Lines, decode, parse_f32, split_word, tokens};
+use super::text::{Lines, decode, parse_f32, split_word, tokens};
 use super::{LoadError, Warning};
 use crate::scene::Material;
 
-/// The materials of one MTL file, in order, with what is worth telling.
+/// The materials of one MTL file, in order, with the warnings.
 #[derive(Debug, Default)]
 pub struct MtlFile {
     /// The materials; the first of several of the same name is the one that counts.
     pub materials: Vec<Material>,
-    /// Pictures and coverage of each of the materials.
+    /// Images and coverage of each of the materials.
     pub maps: Vec<MtlMaps>,
     /// What was found and done.
     pub warnings: Vec<Warning>,
 }
 
-/// The pictures that a material names, and how opaque it is.
+/// The images that a material names, and how opaque it is.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MtlMaps {
     /// `map_Kd`.
@@ -58,13 +58,13 @@ pub fn parse_mtl(text: &[u8], path: &Path) -> Result<MtlFile, LoadError> {
             b"Kd" => open.material.diffuse = color(rest, open.material.diffuse).map_err(fail)?,
             b"Ks" => open.material.specular = color(rest, open.material.specular).map_err(fail)?,
             b"Ke" => open.material.emission = color(rest, open.material.emission).map_err(fail)?,
-            b"map_Kd" => open.maps.diffuse = picture_name(rest),
-            b"map_Ke" => open.maps.emission = picture_name(rest),
-            b"map_d" => open.maps.coverage = picture_name(rest),
-            b"d" => open.maps.alpha = tokens(rest).next().and_then(parse_f32),
+            b"map_Kd" => open.maps.diffuse = image_name(rest),
+            b"map_Ke" => open.maps.emission = image_name(rest),
+            b"map_d" => open.maps.coverage = image_name(rest),
+            b"d" => open.maps.alpha = finite(rest),
             // Where both are given, d counts: programs disagree about Tr.
             b"Tr" if open.maps.alpha.is_none() => {
-                open.maps.alpha = tokens(rest).next().and_then(parse_f32).map(|tr| 1.0 - tr);
+                open.maps.alpha = finite(rest).map(|tr| 1.0 - tr);
             }
             b"illum" => open.illum = tokens(rest).next().and_then(parse_f32),
             _ => {}
@@ -101,9 +101,9 @@ impl MtlFile {
     }
 }
 
-/// Options of a picture statement, with the number of words that each takes; of the first three, all but one may be
+/// Options of an image statement, with the number of words that each takes; of the first three, all but one may be
 /// left out.
-const PICTURE_OPTIONS: [(&[u8], usize); 13] = [
+const IMAGE_OPTIONS: [(&[u8], usize); 13] = [
     (b"-o", 3),
     (b"-s", 3),
     (b"-t", 3),
@@ -119,13 +119,13 @@ const PICTURE_OPTIONS: [(&[u8], usize); 13] = [
     (b"-type", 1),
 ];
 
-/// The file name behind a picture statement's options; it may hold spaces.
-fn picture_name(rest: &[u8]) -> Option<String> {
+/// The file name behind an image statement's options; it may hold spaces.
+fn image_name(rest: &[u8]) -> Option<String> {
     let mut rest = rest.trim_ascii();
     while rest.first() == Some(&b'-') {
         let split = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
         let (option, mut after) = rest.split_at(split(rest));
-        let Some((_, count)) = PICTURE_OPTIONS.iter().find(|(name, _)| *name == option) else { break };
+        let Some((_, count)) = IMAGE_OPTIONS.iter().find(|(name, _)| *name == option) else { break };
         after = after.trim_ascii_start();
         for taken in 0..*count {
             let (word, behind) = after.split_at(split(after));
@@ -137,6 +137,11 @@ fn picture_name(rest: &[u8]) -> Option<String> {
         rest = after;
     }
     (!rest.is_empty()).then(|| decode(rest))
+}
+
+/// A number; `None` where there is none that is finite.
+fn finite(rest: &[u8]) -> Option<f32> {
+    tokens(rest).next().and_then(parse_f32).filter(|value| value.is_finite())
 }
 
 /// One number for grey or three for RGB. `spectral` and `xyz` forms keep the value before.

@@ -33,7 +33,7 @@ pub struct MaterialOverride {
 
 impl MaterialOverride {
     fn apply(&self, material: &mut Material) {
-        // A stated colour is the colour, not a factor of a picture.
+        // A stated colour is the colour, not a factor of an image.
         if let Some(diffuse) = self.diffuse {
             (material.diffuse, material.diffuse_map) = (diffuse, None);
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::LoadError;
-use super::obj::text::{Lines, decode, parse_f32, tokens};
+use super::text::{Lines, decode, parse_f32, tokens};
 
 /// Reads positions from a CSV file: one per line, three numbers separated by commas, semicolons or spaces.
 /// A heading in the first line and lines that start with `#` are passed over.

@@ -47,7 +47,7 @@ impl Document<'_> {
     /// Elements of `N` numbers each; normalized integers become fractions, others their value.
     ///
     /// # Errors
-    /// [`LoadError::Invalid`] if anything is out of range or of another type; `place` is who asks.
+    /// [`LoadError::Invalid`] if anything is out of range or of another type; `place` names what refers to it.
     pub fn floats<const N: usize>(&self, index: usize, place: &str) -> Result<Vec<[f32; N]>, LoadError> {
         let accessor = self.accessor(index, place)?;
         let components = self.components(index, place)?;

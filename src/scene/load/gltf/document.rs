@@ -7,7 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gltf_json::Root;
 
-use crate::scene::load::{LoadError, source};
+use crate::scene::load::{LoadError, Warning, source};
 
 /// Bytes at the start of a binary file.
 const MAGIC: &[u8; 4] = b"glTF";
@@ -44,6 +44,11 @@ impl<'a> Document<'a> {
             document.buffers.push(buffer);
         }
         Ok(document)
+    }
+
+    /// A warning about the file as a whole.
+    pub fn warning(&self, message: String) -> Warning {
+        Warning { file: self.path.to_owned(), line: None, message }
     }
 
     fn buffer(&self, index: usize, binary: Option<&'a [u8]>) -> Result<Cow<'a, [u8]>, LoadError> {

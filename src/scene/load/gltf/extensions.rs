@@ -1,7 +1,6 @@
-//! Which extensions are known: a required one is never ignored, an optional one that changes the picture is told.
+//! Which extensions are known: a required one is never ignored, an optional one that changes the image is reported.
 
 use super::document::Document;
-use super::warning;
 use crate::scene::load::{LoadError, Warning};
 
 /// Extensions that are honoured.
@@ -15,7 +14,7 @@ const HONOURED: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Extensions that say nothing about the picture of a file as it is.
+/// Extensions without which a file looks the same.
 const HARMLESS: &[&str] = &[
     "KHR_animation_pointer",
     "KHR_materials_variants",
@@ -40,13 +39,12 @@ pub fn check(document: &Document<'_>, warnings: &mut Vec<Warning>) -> Result<(),
         let problem = format!("{} is required, but not supported", name.escape_debug());
         return Err(document.error("extensionsRequired", problem));
     }
-    let mut told: Vec<&str> = Vec::new();
+    let mut reported: Vec<&str> = Vec::new();
     for name in root.extensions_used.iter().filter(|name| !known(name)) {
-        if !told.contains(&name.as_str()) {
-            told.push(name);
-            let message =
-                format!("extension {} is not supported, the picture may differ", name.escape_debug());
-            warnings.push(warning(document, message));
+        if !reported.contains(&name.as_str()) {
+            reported.push(name);
+            let message = format!("extension {} is not supported, the image may differ", name.escape_debug());
+            warnings.push(document.warning(message));
         }
     }
     Ok(())

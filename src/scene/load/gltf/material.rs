@@ -9,7 +9,7 @@ use gltf_json::texture::{Info, WrappingMode};
 use gltf_json::validation::Checked;
 
 use super::document::Document;
-use crate::scene::load::{LoadError, Warning, pictures};
+use crate::scene::load::{LoadError, Warning, images};
 use crate::scene::{AlphaMask, Material, Texture, TextureMap, Wrap};
 
 /// Reflectance of non-metals at normal incidence, as glTF has it.
@@ -27,10 +27,10 @@ pub struct Converted {
     pub uv_set: u32,
 }
 
-/// Converts the materials of a file; every picture is decoded once.
+/// Converts the materials of a file; every image is decoded once.
 pub struct Materials<'a> {
     document: &'a Document<'a>,
-    pictures: HashMap<usize, Option<Arc<Texture>>>,
+    images: HashMap<usize, Option<Arc<Texture>>>,
     warnings: &'a mut Vec<Warning>,
 }
 
@@ -38,13 +38,13 @@ impl<'a> Materials<'a> {
     /// Converts all materials, in order.
     ///
     /// # Errors
-    /// [`LoadError::Invalid`] for values that are not finite or negative, and textures that don't exist. A picture
+    /// [`LoadError::Invalid`] for values that are not finite or negative, and textures that don't exist. An image
     /// that can't be read is a warning.
     pub fn convert(
         document: &'a Document<'a>,
         warnings: &'a mut Vec<Warning>,
     ) -> Result<Vec<Converted>, LoadError> {
-        let mut materials = Materials { document, pictures: HashMap::new(), warnings };
+        let mut materials = Materials { document, images: HashMap::new(), warnings };
         (0..document.root.materials.len()).map(|index| materials.one(index)).collect()
     }
 
@@ -74,7 +74,7 @@ impl<'a> Materials<'a> {
                 let mut metallic = pbr.metallic_factor.0;
                 let mut roughness = pbr.roughness_factor.0;
                 if let Some(info) = &pbr.metallic_roughness_texture
-                    && let Some(texture) = self.picture(info.index.value(), &place)?
+                    && let Some(texture) = self.image(info.index.value(), &place)?
                 {
                     // Both vary over the surface there; k_s does not.
                     let mean = texture.mean();
@@ -131,7 +131,9 @@ impl<'a> Materials<'a> {
     ) -> Result<Option<AlphaMask>, LoadError> {
         let cutoff = match source.alpha_mode {
             Checked::Valid(AlphaMode::Opaque) => return Ok(None),
-            Checked::Valid(AlphaMode::Mask) => source.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0),
+            Checked::Valid(AlphaMode::Mask) => {
+                source.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0.clamp(0.0, f32::MAX))
+            }
             Checked::Valid(AlphaMode::Blend) => BLEND_CUTOFF,
             Checked::Invalid => {
                 return Err(self.document.error(&format!("{place}.alphaMode"), "is unknown".to_owned()));
@@ -157,7 +159,7 @@ impl<'a> Materials<'a> {
         uv_set: &mut Option<u32>,
     ) -> Result<Option<TextureMap>, LoadError> {
         let Some(info) = info else { return Ok(None) };
-        let Some(texture) = self.picture(info.index.value(), place)? else { return Ok(None) };
+        let Some(texture) = self.image(info.index.value(), place)? else { return Ok(None) };
         let extension = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         let set = extension.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         if *uv_set.get_or_insert(set) != set {
@@ -186,12 +188,12 @@ impl<'a> Materials<'a> {
         Ok(Some(TextureMap { texture, transform, wrap }))
     }
 
-    /// The picture of a texture; `None` with a warning where it can't be read.
-    fn picture(&mut self, texture: usize, place: &str) -> Result<Option<Arc<Texture>>, LoadError> {
+    /// The image of a texture; `None` with a warning where it can't be read.
+    fn image(&mut self, texture: usize, place: &str) -> Result<Option<Arc<Texture>>, LoadError> {
         let document = self.document;
         let missing = || document.error(place, format!("textures[{texture}] does not exist"));
         let source = document.root.textures.get(texture).ok_or_else(missing)?.source.value();
-        if let Some(known) = self.pictures.get(&source) {
+        if let Some(known) = self.images.get(&source) {
             return Ok(known.clone());
         }
         let place = format!("images[{source}]");
@@ -206,21 +208,20 @@ impl<'a> Materials<'a> {
                 (None, None) => Err(format!("{place} names no data")),
             },
         };
-        let picture =
-            bytes.and_then(|bytes| pictures::decode(&bytes).map_err(|why| format!("{place}: {why}")));
-        let picture = match picture {
-            Ok(picture) => Some(Arc::new(picture)),
+        let image = bytes.and_then(|bytes| images::decode(&bytes).map_err(|why| format!("{place}: {why}")));
+        let image = match image {
+            Ok(image) => Some(Arc::new(image)),
             Err(problem) => {
                 self.warn(format!("{problem}; the texture is left out"));
                 None
             }
         };
-        self.pictures.insert(source, picture.clone());
-        Ok(picture)
+        self.images.insert(source, image.clone());
+        Ok(image)
     }
 
     fn warn(&mut self, message: String) {
-        self.warnings.push(Warning { file: self.document.path.to_owned(), line: None, message });
+        self.warnings.push(self.document.warning(message));
     }
 }
 

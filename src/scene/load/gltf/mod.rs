@@ -20,11 +20,12 @@ use self::material::{Converted, Materials};
 use self::nodes::{PlacedNode, single};
 use self::primitive::{Context, Joints, MeshBuilder};
 use super::compact::drop_unused_vertices;
+use super::model::MAX_COORDINATE;
 use super::transform::{is_invertible, move_mesh};
-use super::{LoadError, Model, Part, Warning, source};
+use super::{LoadError, Model, Part, source};
 use crate::scene::{Instance, Material, TriangleMesh};
 
-/// Reads a glTF file, with the buffers and pictures that it names.
+/// Reads a glTF file, with the buffers and images that it names.
 ///
 /// Meshes that stand in one place are moved there; those in several are kept once, with an
 /// [`Instance`] per place.
@@ -119,7 +120,7 @@ impl Placer<'_> {
         if let Some(bad) = places.iter().find(|place| !self.fits(&mesh, place)) {
             let place = format!("meshes[{}]", uses.shown.mesh);
             let problem =
-                format!("reaches beyond ±{:e} where it stands ({})", super::MAX_COORDINATE, bad.translation);
+                format!("reaches beyond ±{:e} where it stands ({})", MAX_COORDINATE, bad.translation);
             return Err(self.document.error(&place, problem));
         }
         let index = self.model.meshes.len() as u32;
@@ -148,7 +149,7 @@ impl Placer<'_> {
                 if corner >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] }
             };
             let corner = to_world.transform_point3(glam::Vec3::new(choose(0), choose(1), choose(2)));
-            corner.abs().cmple(glam::Vec3::splat(super::MAX_COORDINATE)).all()
+            corner.abs().cmple(glam::Vec3::splat(MAX_COORDINATE)).all()
         })
     }
 
@@ -214,9 +215,4 @@ impl Placer<'_> {
         });
         joints.collect()
     }
-}
-
-/// A warning about a file as a whole.
-fn warning(document: &Document<'_>, message: String) -> Warning {
-    Warning { file: document.path.to_owned(), line: None, message }
 }

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::text::{Lines, decode, parse_f32, split_word, tokens};
 use crate::scene::load::Skipped;
+use crate::scene::load::text::{Lines, decode, parse_f32, split_word, tokens};
 
 /// A corner without a texture coordinate or normal.
 const ABSENT: i32 = i32::MIN;

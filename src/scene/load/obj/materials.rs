@@ -10,13 +10,13 @@ use glam::{Affine2, Vec2};
 
 use super::chunk::{NameKind, NameStatement};
 use crate::scene::load::mtl::{MtlMaps, parse_mtl};
-use crate::scene::load::{LoadError, Warning, pictures, source};
+use crate::scene::load::{LoadError, Warning, images, source};
 use crate::scene::{AlphaMask, Material, Texture, TextureMap, Wrap};
 
 /// Words of an `mtllib` statement that are tried as one name with spaces.
 const LONGEST_NAME: usize = 16;
 
-/// A material of an MTL file whose pictures are not read yet.
+/// A material of an MTL file whose images are not read yet.
 #[derive(Clone)]
 struct Known {
     material: Material,
@@ -30,7 +30,7 @@ pub struct MaterialTable {
     known: HashMap<String, Known>,
     index: HashMap<String, u32>,
     used: Vec<Material>,
-    pictures: HashMap<PathBuf, Option<Arc<Texture>>>,
+    images: HashMap<PathBuf, Option<Arc<Texture>>>,
     /// What was found and done.
     pub warnings: Vec<Warning>,
 }
@@ -74,13 +74,13 @@ impl MaterialTable {
         Ok(())
     }
 
-    /// A material with its pictures, which are read only for materials in use.
+    /// A material with its images, which are read only for materials in use.
     fn complete(&mut self, known: Known) -> Material {
         let Known { mut material, maps, library } = known;
-        let mut read = |name: &Option<String>| self.picture(name.as_deref()?, &library);
+        let mut read = |name: &Option<String>| self.image(name.as_deref()?, &library);
         let (diffuse, emission, coverage) = (read(&maps.diffuse), read(&maps.emission), read(&maps.coverage));
         let map = |texture: Arc<Texture>| {
-            // The files count from the lower left corner of the picture.
+            // The files count from the lower left corner of the image.
             let transform = Affine2::from_translation(Vec2::Y) * Affine2::from_scale(Vec2::new(1.0, -1.0));
             TextureMap { texture, transform, wrap: [Wrap::Repeat; 2] }
         };
@@ -91,32 +91,33 @@ impl MaterialTable {
             // An image's own transparency counts too, as programs show it.
             (None, diffuse) => diffuse,
         };
-        let mask = AlphaMask { map: coverage.map(map), alpha: maps.alpha.unwrap_or(1.0), cutoff: 0.5 };
+        let mask =
+            AlphaMask { map: coverage.map(map), alpha: maps.alpha.unwrap_or(1.0).max(0.0), cutoff: 0.5 };
         material.alpha_mask = (!mask.is_solid()).then_some(mask);
         material
     }
 
-    /// A picture beside an MTL file; `None` with a warning where it can't be read.
-    fn picture(&mut self, name: &str, library: &Path) -> Option<Arc<Texture>> {
+    /// An image beside an MTL file; `None` with a warning where it can't be read.
+    fn image(&mut self, name: &str, library: &Path) -> Option<Arc<Texture>> {
         let folder = library.parent().unwrap_or(Path::new(""));
         let found = existing(name, folder).unwrap_or_else(|| folder.join(name));
-        if let Some(known) = self.pictures.get(&found) {
+        if let Some(known) = self.images.get(&found) {
             return known.clone();
         }
         let bytes = if found.is_file() { source::read_all(&found).ok() } else { None };
-        let picture = bytes
+        let image = bytes
             .ok_or_else(|| "not found or not readable".to_owned())
-            .and_then(|bytes| pictures::decode(&bytes));
-        let picture = match picture {
-            Ok(picture) => Some(Arc::new(picture)),
+            .and_then(|bytes| images::decode(&bytes));
+        let image = match image {
+            Ok(image) => Some(Arc::new(image)),
             Err(why) => {
-                let message = format!("picture '{}' is left out: {why}", name.escape_debug());
+                let message = format!("image '{}' is left out: {why}", name.escape_debug());
                 self.warnings.push(Warning { file: library.to_owned(), line: None, message });
                 None
             }
         };
-        self.pictures.insert(found, picture.clone());
-        picture
+        self.images.insert(found, image.clone());
+        image
     }
 
     /// Index of a material for triangles; a name that no MTL file defines gets the default material,

@@ -10,7 +10,6 @@ mod assemble;
 mod chunk;
 mod materials;
 mod statements;
-pub(super) mod text;
 
 use std::io::Read;
 use std::path::Path;

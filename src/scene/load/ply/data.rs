@@ -8,7 +8,7 @@ pub struct Data<'a> {
     encoding: Encoding,
 }
 
-/// What is told where the file ends too early.
+/// What is wrong where the file ends too early.
 const TOO_SHORT: &str = "the file ends before it";
 
 impl<'a> Data<'a> {

@@ -197,7 +197,7 @@ fn assemble(vertices: Vertices, faces: &Faces, path: &Path) -> Result<Model, Loa
     for uv in &mut uvs {
         let finite = uv.iter().all(|x| x.is_finite());
         skipped.bad_uvs += u64::from(!finite);
-        // The files count from the lower left corner of the picture.
+        // The files count from the lower left corner of the image.
         *uv = if finite { [uv[0], 1.0 - uv[1]] } else { [0.0; 2] };
     }
     let linear = |c: f32| linear_from_srgb(if c.is_finite() { c.clamp(0.0, 1.0) } else { 0.0 });

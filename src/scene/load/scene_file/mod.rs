@@ -4,6 +4,7 @@
 //! scene or the settings. Unknown keys are refused everywhere; ranges are checked by the value types.
 
 mod camera;
+mod gathered;
 mod geometry;
 mod light_mesh;
 mod lights;
@@ -21,6 +22,7 @@ use toml::Spanned;
 pub use self::lights::FalloffName;
 
 use self::camera::CameraTable;
+use self::gathered::Gathered;
 use self::geometry::{GeometryTable, MaterialTable};
 use self::light_mesh::LightMeshTable;
 use self::lights::{LightBoxTable, LightGridTable, LightTable};
@@ -67,15 +69,6 @@ struct SceneTable {
     light_box: Vec<Spanned<LightBoxTable>>,
     #[serde(default)]
     light_grid: Vec<Spanned<LightGridTable>>,
-}
-
-/// What tables and models add up to.
-#[derive(Default)]
-struct Gathered {
-    scene: Scene,
-    cameras: Vec<Camera>,
-    skipped: Skipped,
-    warnings: Vec<Warning>,
 }
 
 /// Reads a TOML scene file and the models that it names, which lie relative to it.

@@ -9,7 +9,8 @@ use toml::Spanned;
 use super::place::Places;
 use super::values::{Lengths, LengthsOrAuto, Point, Positive};
 use crate::Bounds;
-use crate::scene::load::{LoadError, load_points};
+use crate::scene::load::LoadError;
+use crate::scene::load::points::load_points;
 use crate::settings::{
     KernelSettings, LayoutName, Leaks, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing,
 };

@@ -1,25 +1,21 @@
-//! Where a picture differs from a reference, in false colours.
+//! Where an image differs from a reference, in false colours.
 
 use super::metrics::{MetricsError, check_sizes};
 use super::{Image, is_finite};
 
-/// Colour of pixels that are not finite in one of the pictures: a green that the colour map does not contain.
+/// Colour of pixels that are not finite in one of the images: a green that the colour map does not contain.
 pub const NON_FINITE: [u8; 3] = [0, 255, 0];
 
 /// Paints the error of every pixel: the mean over the channels of |a − b|, over the mean of the reference.
 ///
 /// Colours are magma's, a perceptually uniform map: black for no difference, over purple and orange to light yellow
-/// for `full_scale` and more. The scale is linear and fixed, so error pictures can be compared with each other.
+/// for `full_scale` and more. The scale is linear and fixed, so error images can be compared with each other.
 /// Returns 8-bit sRGB, row-major from the top left.
 ///
 /// # Errors
 ///
-/// If the sizes of the pictures differ.
-pub fn error_picture(
-    image: &Image,
-    reference: &Image,
-    full_scale: f64,
-) -> Result<Vec<[u8; 3]>, MetricsError> {
+/// If the sizes of the images differ.
+pub fn error_image(image: &Image, reference: &Image, full_scale: f64) -> Result<Vec<[u8; 3]>, MetricsError> {
     check_sizes(image, reference)?;
     let finite = reference.pixels().iter().filter(|pixel| is_finite(pixel));
     let (sum, count) = finite.fold((0.0_f64, 0_u64), |(sum, count), pixel| {
@@ -49,8 +45,8 @@ mod tests {
     fn colours_follow_the_documented_scale() {
         let reference = Image::from_pixels(5, 1, vec![[1.0; 3]; 5]).unwrap();
         let pixels = vec![[1.0; 3], [1.25; 3], [0.5; 3], [3.0; 3], [1.0, f32::NAN, 1.0]];
-        let picture = Image::from_pixels(5, 1, pixels).unwrap();
-        let colours = error_picture(&picture, &reference, 0.5).unwrap();
+        let image = Image::from_pixels(5, 1, pixels).unwrap();
+        let colours = error_image(&image, &reference, 0.5).unwrap();
         let table = [[0, 0, 4], [183, 55, 121], [252, 253, 191], [252, 253, 191], NON_FINITE];
         for (colour, expected) in colours.iter().zip(&table) {
             // Implementations interpolate the table slightly differently.

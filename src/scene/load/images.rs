@@ -1,4 +1,4 @@
-//! Picture files to textures.
+//! Image files to textures.
 
 use std::io::Cursor;
 
@@ -13,7 +13,7 @@ const MAX_BYTES: u64 = 4 << 30;
 /// Decodes PNG, JPEG, BMP or TGA data.
 ///
 /// # Errors
-/// Why it is no picture, in words.
+/// Why it is no image, in words.
 pub fn decode(bytes: &[u8]) -> Result<Texture, String> {
     let mut reader =
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
@@ -26,8 +26,8 @@ pub fn decode(bytes: &[u8]) -> Result<Texture, String> {
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    let picture = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
-    let (width, height) = picture.dimensions();
-    let texels = picture.pixels().map(|pixel| pixel.0).collect();
-    Texture::new(width, height, texels).ok_or_else(|| "the picture has no pixels".to_owned())
+    let image = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
+    let (width, height) = image.dimensions();
+    let texels = image.pixels().map(|pixel| pixel.0).collect();
+    Texture::new(width, height, texels).ok_or_else(|| "the image has no pixels".to_owned())
 }

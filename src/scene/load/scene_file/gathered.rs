@@ -1,0 +1,76 @@
+//! What the tables of a scene file and its models add up to.
+
+use std::sync::Arc;
+
+use glam::Affine3A;
+
+use crate::scene::load::{Model, Skipped, Warning, transform};
+use crate::scene::{Camera, Instance, Material, Scene, TriangleMaterials, TriangleMesh};
+
+/// The scene so far.
+#[derive(Default)]
+pub struct Gathered {
+    /// Its geometry, materials and lights.
+    pub scene: Scene,
+    /// Cameras, that of the scene file first.
+    pub cameras: Vec<Camera>,
+    /// Elements of the models that were left out.
+    pub skipped: Skipped,
+    /// What was found and done.
+    pub warnings: Vec<Warning>,
+}
+
+impl Gathered {
+    /// Adds a model in all its placements.
+    pub fn add(&mut self, model: Model, placements: &[Option<Affine3A>]) {
+        let scene = &mut self.scene;
+        let first_mesh = scene.meshes.len() as u32;
+        let first_material = scene.materials.len() as u32;
+        scene.materials.extend(model.materials);
+        let mut instances = model.instances;
+        let mut meshes = model.meshes;
+        for mesh in &mut meshes {
+            match &mut mesh.materials {
+                TriangleMaterials::Uniform(material) => *material += first_material,
+                TriangleMaterials::PerTriangle(list) => list.iter_mut().for_each(|m| *m += first_material),
+            }
+        }
+        for placement in placements {
+            let to_world = placement.unwrap_or(Affine3A::IDENTITY);
+            scene.lights.extend(model.lights.iter().map(|light| transform::moved_light(light, &to_world)));
+            let cameras = model.cameras.iter().map(|camera| transform::moved_camera(camera, &to_world));
+            self.cameras.extend(cameras);
+        }
+        // Geometry that stands in one place only is moved there, which spares rays the way through an instance.
+        let mut placements = placements.to_vec();
+        if let ([Some(to_world)], true) =
+            (placements.as_slice(), instances.iter().all(|i| i.to_world.is_none()))
+        {
+            let to_world = *to_world;
+            for mesh in &mut meshes {
+                transform::move_mesh(mesh, &to_world);
+            }
+            placements = vec![None];
+        }
+        for placement in &placements {
+            for instance in &mut instances {
+                let to_world = match (placement, instance.to_world) {
+                    (None, own) => own,
+                    (Some(outer), None) => Some(*outer),
+                    (Some(outer), Some(inner)) => Some(*outer * inner),
+                };
+                scene.instances.push(Instance { mesh: first_mesh + instance.mesh, to_world });
+            }
+        }
+        scene.meshes.extend(meshes.into_iter().map(Arc::<TriangleMesh>::new));
+        self.skipped.add(&model.skipped);
+        self.warnings.extend(model.warnings);
+    }
+
+    /// Material 0 exists in every scene.
+    pub fn ensure_material(&mut self) {
+        if self.scene.materials.is_empty() {
+            self.scene.materials.push(Material::default());
+        }
+    }
+}
