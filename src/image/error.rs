@@ -24,7 +24,7 @@ pub enum ImageError {
         /// What the operating system says.
         source: std::io::Error,
     },
-    /// A file was read, but its contents are no image this library understands.
+    /// A file was read, but its contents are no image that this library understands.
     #[error("{}: {source}", path.display())]
     Contents {
         /// The file.

@@ -152,7 +152,7 @@ fn decode_layer(bytes: &[u8]) -> Result<Image, DecodeError> {
     let mut area = 0;
     for block in chunks.sequential_decompressor(false) {
         let block = block.map_err(decode_error)?;
-        // A damaged offset table can lead to another block than the one asked for, or twice to the same.
+        // A damaged offset table can lead to another block than the one wanted, or twice to the same.
         let index = block.index;
         if index.layer != layer
             || index.level != Vec2(0, 0)

@@ -126,12 +126,12 @@ fn a_pixel_that_is_not_finite_fails_the_comparison() {
 }
 
 #[test]
-fn the_error_picture_is_a_png_with_one_colour_per_pixel() {
+fn the_error_image_is_a_png_with_one_colour_per_pixel() {
     let scratch = Scratch::new("picture");
     let reference = scratch.save("b.exr", 2, &[[1.0; 3]; 4]);
     let picture = scratch.save("a.exr", 2, &[[1.0; 3], [1.0; 3], [1.0; 3], [2.0; 3]]);
     let target = scratch.0.join("error.png");
-    json(&picture, &reference, &["--error-picture", target.to_str().unwrap()]);
+    json(&picture, &reference, &["--error-image", target.to_str().unwrap()]);
     let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&target).unwrap()))
         .read_info()
         .unwrap();
@@ -161,7 +161,7 @@ fn what_cannot_be_compared_is_an_error_that_names_the_file() {
         assert!(message.contains(word), "{message}");
         assert_eq!(out, "");
     }
-    let (verdict, _) = compare(&picture, &picture, &["--error-picture", "error.exr"]);
+    let (verdict, _) = compare(&picture, &picture, &["--error-image", "error.exr"]);
     assert!(verdict.is_err());
     assert!(!Path::new("error.exr").exists());
 }
