@@ -18,7 +18,7 @@ use lightmesh::light_mesh::points::Neighbours;
 use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{
-    Instance, LightShape, Material, PointLight, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
+    Instance, Light, LightKind, Material, Positions, Ray, Scene, SurfacePoint, TriangleMaterials,
     TriangleMesh,
 };
 use lightmesh::settings::{Estimator, KernelSettings, Leaks, PointSettings, Radius, Spacing};
@@ -50,10 +50,10 @@ fn scene(lights: usize) -> Scene {
         colors: None,
         materials: TriangleMaterials::Uniform(0),
     };
-    let light = |_| PointLight {
+    let light = |_| Light {
         position: random.in_box(Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.3, 1.0)),
         intensity: Vec3::ONE,
-        shape: LightShape::Point,
+        kind: LightKind::Point,
     };
     Scene {
         meshes: vec![Arc::new(mesh)],

@@ -11,7 +11,7 @@ use crate::accel::{Accel, Backend, Coherence, PacketLanes, RayPacket, with_accel
 use crate::light_mesh::direct::{Basis, DirectField, DirectMesh};
 use crate::lights::{EmissiveTriangles, PackedLights};
 use crate::render::RenderError;
-use crate::scene::{PointLight, Ray, Scene, SurfacePoint};
+use crate::scene::{Light, Ray, Scene, SurfacePoint};
 use crate::settings::{Estimator, KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
 use crate::simd::LANES;
 use crate::world::World;
@@ -118,12 +118,7 @@ fn mesh_points(
 }
 
 /// Traces from packets of neighbouring points towards one light after the other; returns the blocked rays.
-fn points_to_one_light<A: Accel>(
-    accel: &A,
-    points: &[Vec3],
-    lights: &[PointLight],
-    coherence: Coherence,
-) -> u64 {
+fn points_to_one_light<A: Accel>(accel: &A, points: &[Vec3], lights: &[Light], coherence: Coherence) -> u64 {
     let group = |points: &[Vec3]| {
         let mut blocked = 0;
         let active = ((1u64 << points.len()) - 1) as u32;
@@ -141,7 +136,7 @@ fn points_to_one_light<A: Accel>(
 }
 
 /// Traces from each point in packets towards neighbouring lights; returns the blocked rays.
-fn one_point_to_lights<A: Accel>(accel: &A, points: &[Vec3], lights: &[PointLight]) -> u64 {
+fn one_point_to_lights<A: Accel>(accel: &A, points: &[Vec3], lights: &[Light]) -> u64 {
     let group = |points: &[Vec3]| {
         let mut blocked = 0;
         let mut packet = RayPacket::<LANES>::empty();

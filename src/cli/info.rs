@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::error::{CommandError, Outcome};
 use super::shared::{QuietArgs, SceneArgs};
 use crate::accel::{Footprint, MemoryEstimate};
-use crate::scene::LightShape;
+use crate::scene::LightKind;
 use crate::scene::load::OpenedScene;
 
 /// What `info` takes.
@@ -52,10 +52,10 @@ impl Info {
         let scene = &loaded.scene;
         let mut lights = Lights::default();
         for light in &scene.lights {
-            match light.shape {
-                LightShape::Point => lights.point += 1,
-                LightShape::Spot { .. } => lights.spot += 1,
-                LightShape::Directional { .. } => lights.directional += 1,
+            match light.kind {
+                LightKind::Point => lights.point += 1,
+                LightKind::Spot { .. } => lights.spot += 1,
+                LightKind::Directional { .. } => lights.directional += 1,
             }
         }
         let unique_triangles = scene.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum();

@@ -14,7 +14,7 @@ use crate::image::tone::auto_exposure;
 use crate::render::render;
 use crate::scene::load::scene_file::FalloffName;
 use crate::scene::load::{ModelFormat, OpenedScene, load_model};
-use crate::scene::{Camera, LightShape, PointLight};
+use crate::scene::{Camera, Light, LightKind};
 use crate::settings::{Integrator, Resolve, Spacing};
 
 /// What `init` takes.
@@ -153,19 +153,19 @@ fn camera_table(camera: &Camera) -> String {
     )
 }
 
-fn light_table(light: &PointLight) -> String {
+fn light_table(light: &Light) -> String {
     let mut table = "[[light]]\n".to_owned();
-    let direction = match light.shape {
-        LightShape::Point => None,
-        LightShape::Spot { direction, .. } | LightShape::Directional { direction } => Some(direction),
+    let direction = match light.kind {
+        LightKind::Point => None,
+        LightKind::Spot { direction, .. } | LightKind::Directional { direction } => Some(direction),
     };
-    if !matches!(light.shape, LightShape::Directional { .. }) {
+    if !matches!(light.kind, LightKind::Directional { .. }) {
         table += &format!("position = {:?}\n", light.position.to_array());
     }
     if let Some(direction) = direction {
         table += &format!("direction = {:?}\n", direction.to_array());
     }
-    if let LightShape::Spot { inner_cosine, outer_cosine, .. } = light.shape {
+    if let LightKind::Spot { inner_cosine, outer_cosine, .. } = light.kind {
         let angles = [inner_cosine, outer_cosine].map(|cosine| cosine.acos().to_degrees());
         table += &format!("cone = {angles:?}\n");
     }

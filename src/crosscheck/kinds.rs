@@ -6,7 +6,7 @@ use super::queries::{GROUP, RayQueries};
 use crate::Bounds;
 use crate::lights::PackedLights;
 use crate::sampling::SplitMix64;
-use crate::scene::{Camera, CameraRays, PointLight, Ray, Scene, SurfacePoint};
+use crate::scene::{Camera, CameraRays, Light, Ray, Scene, SurfacePoint};
 
 macro_rules! kinds {
     ($($kind:ident $name:literal $what:literal,)*) => {
@@ -106,9 +106,8 @@ impl<'a> RaySource<'a> {
         }
         let lights = if scene.lights.is_empty() {
             let mut random = SplitMix64::new(seed);
-            let lights: Vec<_> = (0..20)
-                .map(|_| PointLight::point(random.in_box(bounds.min, bounds.max), Vec3::ONE))
-                .collect();
+            let lights: Vec<_> =
+                (0..20).map(|_| Light::point(random.in_box(bounds.min, bounds.max), Vec3::ONE)).collect();
             PackedLights::of_scene(&Scene { lights, ..Scene::default() })
         } else {
             PackedLights::of_scene(scene)

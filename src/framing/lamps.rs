@@ -4,17 +4,17 @@ use glam::Vec3;
 
 use super::probe::Probe;
 use crate::accel::Accel;
-use crate::scene::{Camera, LightShape, PointLight};
+use crate::scene::{Camera, Light, LightKind};
 
 /// Three directional lights relative to a camera: from the upper left, weaker from the right, and from straight above.
-pub fn directional(camera: &Camera) -> Vec<PointLight> {
+pub fn directional(camera: &Camera) -> Vec<Light> {
     let back = (camera.position - camera.look_at).normalize_or(Vec3::Z);
     let right = camera.up.cross(back).normalize_or(Vec3::X);
     let up = back.cross(right);
-    let light = |towards: Vec3, illuminance: f32| PointLight {
+    let light = |towards: Vec3, illuminance: f32| Light {
         position: camera.position,
         intensity: Vec3::splat(illuminance),
-        shape: LightShape::Directional { direction: -towards.normalize_or(Vec3::Y) },
+        kind: LightKind::Directional { direction: -towards.normalize_or(Vec3::Y) },
     };
     vec![
         light(back + 0.7 * up - 0.6 * right, 2.5),
@@ -33,7 +33,7 @@ const REACH: f32 = 0.25;
 const HEIGHT: f32 = 0.85;
 
 /// Point lights in the rooms: each in turn where it lights most of the positions that are still dark.
-pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<PointLight> {
+pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<Light> {
     let reach = REACH * probe.diagonal();
     let mut dark: Vec<Vec3> = positions.iter().take(POSITIONS).copied().collect();
     let hung: Vec<Vec3> = dark.iter().map(|&position| probe.at_height(position, HEIGHT)).collect();
@@ -46,7 +46,7 @@ pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<PointLigh
         let Some((1.., lamp)) = best else { break };
         dark.retain(|&position| !lights(lamp, position));
         // An illuminance of 3 at the end of the reach; the exposure follows from the image.
-        lamps.push(PointLight::point(lamp, Vec3::splat(3.0 * reach * reach)));
+        lamps.push(Light::point(lamp, Vec3::splat(3.0 * reach * reach)));
     }
     lamps
 }
@@ -55,9 +55,9 @@ pub fn in_rooms<A: Accel>(probe: &Probe<A>, positions: &[Vec3]) -> Vec<PointLigh
 const WEAKER: f32 = 0.125;
 
 /// Adds a weak lamp at the camera, so that nothing in view stays black.
-pub fn with_one_at(camera: &Camera, mut lamps: Vec<PointLight>) -> Vec<PointLight> {
+pub fn with_one_at(camera: &Camera, mut lamps: Vec<Light>) -> Vec<Light> {
     if let Some(lamp) = lamps.first() {
-        lamps.push(PointLight::point(camera.position, lamp.intensity * WEAKER));
+        lamps.push(Light::point(camera.position, lamp.intensity * WEAKER));
     }
     lamps
 }

@@ -12,7 +12,7 @@ mod probe;
 use self::probe::Probe;
 use crate::accel::{Accel, Backend, with_accel};
 use crate::scene::load::OpenedScene;
-use crate::scene::{Camera, PointLight};
+use crate::scene::{Camera, Light};
 
 /// What is chosen for a scene that lacks a camera or lights; nothing for one that lacks neither.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,7 +20,7 @@ pub struct ChosenView {
     /// The camera of a scene without one.
     pub camera: Option<Camera>,
     /// The lights of a bare model without lights.
-    pub lights: Vec<PointLight>,
+    pub lights: Vec<Light>,
     /// Whether the view shows anything only if camera rays pass through the backs of all materials.
     pub cull: bool,
     /// What was chosen, in words.
@@ -82,7 +82,7 @@ struct View {
     /// Whether it shows anything only if backs are culled.
     cut_open: bool,
     /// Lights for rooms that sunlight doesn't reach.
-    lamps: Vec<PointLight>,
+    lamps: Vec<Light>,
 }
 
 /// Share of a position's surroundings that must be fronts for it to be enclosed: five sides of a box are more.

@@ -6,7 +6,7 @@ use crate::Bounds;
 use crate::accel::Accel;
 use crate::sampling::SphereStrata;
 use crate::sampling::SplitMix64;
-use crate::scene::{Interaction, LightShape, Ray, Scene};
+use crate::scene::{Interaction, LightKind, Ray, Scene};
 
 /// A scene that rays explore.
 pub struct Probe<'a, A> {
@@ -179,22 +179,22 @@ impl<A: Accel> Probe<'_, A> {
     pub fn is_lit(&self, sight: &Sight) -> bool {
         let at = sight.near;
         let strongest = self.scene.lights.iter().map(|light| {
-            let (towards, falloff) = match light.shape {
-                LightShape::Directional { direction } => (-direction, 1.0),
-                LightShape::Point | LightShape::Spot { .. } => {
+            let (towards, falloff) = match light.kind {
+                LightKind::Directional { direction } => (-direction, 1.0),
+                LightKind::Point | LightKind::Spot { .. } => {
                     let offset = light.position - at;
                     (offset.normalize_or_zero(), self.scene.falloff.reciprocal(offset.length()))
                 }
             };
             let cosine = sight.normal.dot(towards).max(0.0);
-            (light, light.intensity.max_element() * light.shape.cone_factor(-towards) * falloff * cosine)
+            (light, light.intensity.max_element() * light.kind.cone_factor(-towards) * falloff * cosine)
         });
         let Some((light, irradiance)) = strongest.max_by(|(_, a), (_, b)| a.total_cmp(b)) else {
             return true;
         };
-        let ray = match light.shape {
-            LightShape::Directional { direction } => Ray::new(at, -direction),
-            LightShape::Point | LightShape::Spot { .. } => Ray::between(at, light.position),
+        let ray = match light.kind {
+            LightKind::Directional { direction } => Ray::new(at, -direction),
+            LightKind::Point | LightKind::Spot { .. } => Ray::between(at, light.position),
         };
         irradiance > 0.0 && !self.accel.occluded(&ray)
     }

@@ -1,4 +1,4 @@
-//! Keeping light from leaking through walls, and darkness out of solids (spec §3).
+//! Keeping light from leaking through walls, and darkness out of solids (method §3).
 
 use glam::Vec3;
 

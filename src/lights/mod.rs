@@ -2,8 +2,8 @@
 
 mod emissive;
 mod falloff;
+mod kinds;
 mod packed;
-mod shapes;
 
 pub use emissive::EmissiveTriangles;
 pub use packed::{IncidentLights, LightChunk, PackedLights};

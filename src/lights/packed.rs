@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::VisibilityBits;
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
-use super::shapes::ShapeLanes;
-use crate::scene::{Falloff, LightShape, PointLight, Scene, SurfacePoint};
+use super::kinds::KindLanes;
+use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
 
 /// Sixteen lights.
@@ -14,7 +14,7 @@ pub struct LightChunk {
     /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
     pub position: [Lanes; 3],
     /// What lights that are no point lights differ in; `None` where all lanes are point lights.
-    shapes: Option<Box<ShapeLanes>>,
+    kinds: Option<Box<KindLanes>>,
     /// E, by channel; 0 in lanes that hold no light.
     pub intensity: [Lanes; 3],
     /// The lanes that hold a light.
@@ -25,7 +25,7 @@ impl LightChunk {
     /// The way from `x` to the light in `lane`: its end is beyond all that could hide the light.
     #[inline(always)]
     pub fn to_light(&self, lane: usize, x: [f32; 3]) -> [f32; 3] {
-        let local = self.shapes.as_ref().map_or(1.0, |shapes| shapes.local[lane]);
+        let local = self.kinds.as_ref().map_or(1.0, |kinds| kinds.local[lane]);
         [0, 1, 2].map(|axis| self.position[axis][lane] - local * x[axis])
     }
 }
@@ -44,7 +44,7 @@ pub struct PackedLights {
 impl PackedLights {
     /// Table of a scene's lights.
     pub fn of_scene(scene: &Scene) -> Self {
-        let directional = |light: &PointLight| matches!(light.shape, LightShape::Directional { .. });
+        let directional = |light: &Light| matches!(light.kind, LightKind::Directional { .. });
         let reach = if scene.lights.iter().any(directional) {
             // From wherever mesh points are, a margin around the scene, to beyond its far side.
             4.0 * scene.bounds().extent().length()
@@ -55,24 +55,24 @@ impl PackedLights {
     }
 
     /// Table of lights; occlusion rays to directional lights are `reach` long.
-    pub fn new(lights: &[PointLight], falloff: Falloff, reach: f32) -> Self {
+    pub fn new(lights: &[Light], falloff: Falloff, reach: f32) -> Self {
         let mut order: Vec<usize> = (0..lights.len()).collect();
         let mut bounds = crate::Bounds::EMPTY;
         lights.iter().for_each(|light| bounds.extend(light.position));
-        order.sort_by_key(|&i| (lights[i].shape != LightShape::Point, morton(lights[i].position, bounds), i));
+        order.sort_by_key(|&i| (lights[i].kind != LightKind::Point, morton(lights[i].position, bounds), i));
         let chunks = order
             .chunks(LANES)
             .map(|members| {
                 let zero = [[0.0; LANES]; 3];
-                let mut chunk = LightChunk { position: zero, shapes: None, intensity: zero, used: 0 };
+                let mut chunk = LightChunk { position: zero, kinds: None, intensity: zero, used: 0 };
                 for (lane, light) in members.iter().map(|&i| &lights[i]).enumerate() {
-                    let position = match light.shape {
-                        LightShape::Directional { direction } => direction * -reach.max(1.0),
+                    let position = match light.kind {
+                        LightKind::Directional { direction } => direction * -reach.max(1.0),
                         _ => light.position,
                     };
-                    if light.shape != LightShape::Point {
-                        let shapes = chunk.shapes.get_or_insert_with(|| Box::new(ShapeLanes::POINTS));
-                        shapes.set(lane, light.shape);
+                    if light.kind != LightKind::Point {
+                        let kinds = chunk.kinds.get_or_insert_with(|| Box::new(KindLanes::POINTS));
+                        kinds.set(lane, light.kind);
                     }
                     for axis in 0..3 {
                         chunk.position[axis][lane] = position[axis];
@@ -122,9 +122,9 @@ const TINY_DISTANCE: f32 = 1e-18;
 
 impl PackedLights {
     /// Σ_i V_i · φ2(n_y, lp_i − y) · E_i / φ1(|lp_i − y|), with the visibility V of each chunk's lights given by
-    /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of spec §4.
+    /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of method §4.
     ///
-    /// Lights behind the triangle's plane give nothing, whatever the shading normal says (spec §7).
+    /// Lights behind the triangle's plane give nothing, whatever the shading normal says (method §7).
     #[inline(always)]
     pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl FnMut(usize) -> Option<Lanes>) -> Vec3 {
         with_falloff!(self.falloff, law => self.irradiance_with(surface, law, visibility))
@@ -143,7 +143,7 @@ impl PackedLights {
         for (index, chunk) in self.chunks.iter().enumerate() {
             let Some(visible) = visibility(index) else { continue };
             let mut factor = [0.0f32; LANES];
-            if let Some(shapes) = &chunk.shapes {
+            if let Some(kinds) = &chunk.kinds {
                 for lane in 0..LANES {
                     let d = chunk.to_light(lane, y.to_array());
                     let [dx, dy, dz] = d;
@@ -151,7 +151,7 @@ impl PackedLights {
                     let cosine = n.x * dx + n.y * dy + n.z * dz;
                     let side = g.x * dx + g.y * dy + g.z * dz;
                     let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
-                    let share = shapes.cone(lane, d, distance) * shapes.over_distance(lane, law, distance);
+                    let share = kinds.cone(lane, d, distance) * kinds.over_distance(lane, law, distance);
                     factor[lane] = visible[lane] * lit * share;
                 }
             } else {
@@ -187,13 +187,13 @@ impl PackedLights {
         for (index, chunk) in self.chunks.iter().enumerate() {
             let mut direction = [[0.0f32; LANES]; 3];
             let mut reciprocal = [0.0f32; LANES];
-            if let Some(shapes) = &chunk.shapes {
+            if let Some(kinds) = &chunk.kinds {
                 for lane in 0..LANES {
                     let d = chunk.to_light(lane, x.to_array());
                     let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt().max(TINY_DISTANCE);
                     (0..3).for_each(|axis| direction[axis][lane] = d[axis] / distance);
-                    let falloff = shapes.over_distance(lane, law, distance) * distance;
-                    reciprocal[lane] = falloff * shapes.cone(lane, d, distance);
+                    let falloff = kinds.over_distance(lane, law, distance) * distance;
+                    reciprocal[lane] = falloff * kinds.cone(lane, d, distance);
                 }
             } else {
                 for lane in 0..LANES {
@@ -246,9 +246,9 @@ mod tests {
     #[test]
     fn illumination_matches_hand_computed_numbers() {
         let lights = [
-            PointLight::point(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
-            PointLight::point(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
-            PointLight::point(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
+            Light::point(Vec3::new(0.0, 2.0, 0.0), Vec3::new(6.0, 3.0, 0.0)),
+            Light::point(Vec3::new(3f32.sqrt(), 1.0, 0.0), Vec3::splat(12.0)),
+            Light::point(Vec3::new(0.0, -1.0, 0.0), Vec3::splat(100.0)),
         ];
         // φ2/φ1: linear 1/(1+2) and 0.5/(1+2); inverse square 1/4 and 0.5/4; none 1 and 0.5.
         for (falloff, expected) in [
@@ -266,7 +266,7 @@ mod tests {
     /// A light exactly at the lit point gives no NaN.
     #[test]
     fn a_light_at_the_point_is_finite() {
-        let light = PointLight::point(Vec3::ZERO, Vec3::ONE);
+        let light = Light::point(Vec3::ZERO, Vec3::ONE);
         for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
             let table = PackedLights::new(&[light], falloff, 0.0);
             assert!(table.irradiance(&surface(), |_| Some([1.0; LANES])).is_finite());
@@ -281,20 +281,20 @@ mod tests {
     #[test]
     fn spot_and_directional_lights_match_hand_computed_numbers() {
         let above = Vec3::new(0.0, 2.0, 0.0);
-        let spot = |cosine: f32| PointLight {
+        let spot = |cosine: f32| Light {
             position: above,
             intensity: Vec3::splat(12.0),
-            shape: LightShape::Spot {
+            kind: LightKind::Spot {
                 direction: Vec3::new((1.0 - cosine * cosine).sqrt(), -cosine, 0.0),
                 inner_cosine: 0.9,
                 outer_cosine: 0.5,
             },
         };
         let direction = Vec3::new(3f32.sqrt() / 2.0, -0.5, 0.0);
-        let sun = PointLight {
+        let sun = Light {
             position: above,
             intensity: Vec3::splat(2.0),
-            shape: LightShape::Directional { direction },
+            kind: LightKind::Directional { direction },
         };
         // 12/2² = 3 on the axis; 3 · ((0.7 − 0.5)/(0.9 − 0.5))² = 3/4 at cosine 0.7; 2 · 0.5 from the sun.
         for (light, expected) in [(spot(1.0), 3.0), (spot(0.7), 0.75), (spot(0.4), 0.0), (sun, 1.0)] {
@@ -302,7 +302,7 @@ mod tests {
             let sum = table.irradiance(&surface(), |_| Some([1.0; LANES]));
             assert!(sum.abs_diff_eq(Vec3::splat(expected), 1e-5), "{light:?}: {sum} for {expected}");
             let reciprocals = incident_at_the_origin(&table)[0].1[0];
-            let cosine = if matches!(light.shape, LightShape::Directional { .. }) { 0.5 } else { 1.0 };
+            let cosine = if matches!(light.kind, LightKind::Directional { .. }) { 0.5 } else { 1.0 };
             assert!((light.intensity.x * reciprocals * cosine - expected).abs() < 1e-5);
         }
     }

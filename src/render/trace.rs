@@ -150,7 +150,7 @@ impl<A: Accel> Tracer<'_, A> {
         }
     }
 
-    /// The first surface on a ray that is not a culled back face (spec §7).
+    /// The first surface on a ray that is not a culled back face (method §7).
     #[inline(always)]
     fn first_visible(&self, ray: &Ray, mut hit: Option<Hit>) -> Option<Interaction> {
         let mut ray = *ray;

@@ -2,24 +2,24 @@
 
 use glam::Vec3;
 
-/// Point light i of eq. (1), or one of the two kinds of light that models bring beside it.
+/// Light i of eq. (1): a point light, or one of the two other kinds that models bring.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointLight {
+pub struct Light {
     /// lp_i; without meaning for directional lights.
     pub position: Vec3,
     /// E_i, linear RGB, ≥ 0.
     pub intensity: Vec3,
     /// Where the light goes.
-    pub shape: LightShape,
+    pub kind: LightKind,
 }
 
-/// Where the light of a [`PointLight`] goes.
+/// Where the light of a [`Light`] goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum LightShape {
+pub enum LightKind {
     /// Everywhere alike: the paper's.
     #[default]
     Point,
-    /// Into a cone: E_i is multiplied by [`LightShape::cone_factor`], V_i and φ1 are a point light's.
+    /// Into a cone: E_i is multiplied by [`LightKind::cone_factor`], V_i and φ1 are a point light's.
     Spot {
         /// Axis of the cone, unit length.
         direction: Vec3,
@@ -35,7 +35,7 @@ pub enum LightShape {
     },
 }
 
-impl LightShape {
+impl LightKind {
     /// Slope and offset such that clamp(slope · c + offset, 0, 1)² is the share of E_i at the angle of cosine c from
     /// the axis, as KHR_lights_punctual recommends.
     pub(crate) fn cone_terms(self) -> (f32, f32) {
@@ -58,10 +58,10 @@ impl LightShape {
     }
 }
 
-impl PointLight {
+impl Light {
     /// A light that shines everywhere alike.
     pub fn point(position: Vec3, intensity: Vec3) -> Self {
-        Self { position, intensity, shape: LightShape::Point }
+        Self { position, intensity, kind: LightKind::Point }
     }
 
     /// A light that shines along `direction` (any length but 0): full up to the first of the angles of `cone` from there,
@@ -69,13 +69,13 @@ impl PointLight {
     pub fn spot(position: Vec3, direction: Vec3, cone: [f32; 2], intensity: Vec3) -> Self {
         let [inner_cosine, outer_cosine] = cone.map(|angle| angle.to_radians().cos());
         let direction = unit(direction);
-        Self { position, intensity, shape: LightShape::Spot { direction, inner_cosine, outer_cosine } }
+        Self { position, intensity, kind: LightKind::Spot { direction, inner_cosine, outer_cosine } }
     }
 
     /// A light from infinitely far away that travels along `direction` (any length but 0).
     pub fn directional(direction: Vec3, intensity: Vec3) -> Self {
-        let shape = LightShape::Directional { direction: unit(direction) };
-        Self { position: Vec3::ZERO, intensity, shape }
+        let kind = LightKind::Directional { direction: unit(direction) };
+        Self { position: Vec3::ZERO, intensity, kind }
     }
 }
 

@@ -22,7 +22,7 @@ use crate::Bounds;
 pub use alpha_mask::{AlphaMask, AlphaMasks, MaskedMesh};
 pub use camera::{Camera, CameraError};
 pub use camera_rays::CameraRays;
-pub use light::{Falloff, LightShape, PointLight};
+pub use light::{Falloff, Light, LightKind};
 pub use material::Material;
 pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use ray::{Hit, Ray};
@@ -34,14 +34,14 @@ pub use validate::{BadValue, MeshDataError, SceneError};
 ///
 /// ```
 /// use glam::{Affine3A, Vec3};
-/// use lightmesh::scene::{Material, PointLight, Scene, TriangleMesh};
+/// use lightmesh::scene::{Material, Light, Scene, TriangleMesh};
 ///
 /// let mut scene = Scene::new();
 /// let red = scene.add_material(Material::diffuse(Vec3::new(0.7, 0.1, 0.1)));
 /// let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let mesh = scene.add(TriangleMesh::new(positions, vec![[0, 1, 2]]).with_material(red));
 /// scene.place(mesh, Affine3A::from_translation(Vec3::X));
-/// scene.lights.push(PointLight::point(Vec3::Z, Vec3::ONE));
+/// scene.lights.push(Light::point(Vec3::Z, Vec3::ONE));
 /// scene.validate()?;
 /// # Ok::<(), lightmesh::scene::SceneError>(())
 /// ```
@@ -54,7 +54,7 @@ pub struct Scene {
     /// Materials; at least one.
     pub materials: Vec<Material>,
     /// Point lights.
-    pub lights: Vec<PointLight>,
+    pub lights: Vec<Light>,
     /// How light falls off with distance, φ1 of eq. (1).
     pub falloff: Falloff,
     /// Radiance of rays that leave the scene, linear RGB.

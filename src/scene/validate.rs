@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{AlphaMask, Falloff, LightShape, Material, PointLight, Scene, TriangleMaterials, TriangleMesh};
+use super::{AlphaMask, Falloff, Light, LightKind, Material, Scene, TriangleMaterials, TriangleMesh};
 
 /// A scene that contradicts itself, or holds numbers that no light can be computed from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -104,7 +104,7 @@ pub struct BadValue {
 /// How far the length of a direction may be from 1.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
-impl PointLight {
+impl Light {
     /// Whether light can be computed from the light; `index` is its place in the scene, for the message.
     ///
     /// # Errors
@@ -190,17 +190,17 @@ fn validate_material(material: &Material) -> Result<(), BadValue> {
     }
 }
 
-fn validate_light(light: &PointLight) -> Result<(), BadValue> {
+fn validate_light(light: &Light) -> Result<(), BadValue> {
     color("intensity", light.intensity)?;
-    if !matches!(light.shape, LightShape::Directional { .. }) {
+    if !matches!(light.kind, LightKind::Directional { .. }) {
         check("position", "be finite", light.position, light.position.is_finite())?;
     }
-    let (LightShape::Spot { direction, .. } | LightShape::Directional { direction }) = light.shape else {
+    let (LightKind::Spot { direction, .. } | LightKind::Directional { direction }) = light.kind else {
         return Ok(());
     };
     let unit = (direction.length() - 1.0).abs() <= UNIT_TOLERANCE;
     check("direction", "be of unit length", direction, unit)?;
-    let LightShape::Spot { inner_cosine, outer_cosine, .. } = light.shape else { return Ok(()) };
+    let LightKind::Spot { inner_cosine, outer_cosine, .. } = light.kind else { return Ok(()) };
     let ordered = outer_cosine <= inner_cosine && (-1.0..=1.0).contains(&outer_cosine) && inner_cosine <= 1.0;
     let rule = "be cosines of angles of which the outer one is at least the inner one";
     check("cone", rule, Vec2::new(inner_cosine, outer_cosine), ordered)
@@ -311,24 +311,24 @@ mod tests {
     /// The same of lights, whose directions must be of unit length since cosines are taken with them.
     #[test]
     fn lights_must_be_finite_and_their_directions_of_unit_length() {
-        let good = PointLight::point(Vec3::ZERO, Vec3::ONE);
-        let message = |light: PointLight| {
+        let good = Light::point(Vec3::ZERO, Vec3::ONE);
+        let message = |light: Light| {
             let mut scene = Scene::new();
             scene.lights = vec![good, light];
             message(&scene)
         };
         let intensity = "light 1: intensity must be finite and not negative, found [-1, 0, 0]";
-        assert_eq!(message(PointLight { intensity: Vec3::NEG_X, ..good }), intensity);
+        assert_eq!(message(Light { intensity: Vec3::NEG_X, ..good }), intensity);
         let position = "light 1: position must be finite, found [NaN, NaN, NaN]";
-        assert_eq!(message(PointLight { position: Vec3::NAN, ..good }), position);
-        let shape = LightShape::Directional { direction: Vec3::Y * 2.0 };
+        assert_eq!(message(Light { position: Vec3::NAN, ..good }), position);
+        let kind = LightKind::Directional { direction: Vec3::Y * 2.0 };
         let direction = "light 1: direction must be of unit length, found [0, 2, 0]";
-        assert_eq!(message(PointLight { shape, ..good }), direction);
-        assert!(message(PointLight::directional(Vec3::ZERO, Vec3::ONE)).contains("unit length"));
-        let spot = |inner, outer| PointLight::spot(Vec3::ZERO, Vec3::X * 3.0, [inner, outer], Vec3::ONE);
+        assert_eq!(message(Light { kind, ..good }), direction);
+        assert!(message(Light::directional(Vec3::ZERO, Vec3::ONE)).contains("unit length"));
+        let spot = |inner, outer| Light::spot(Vec3::ZERO, Vec3::X * 3.0, [inner, outer], Vec3::ONE);
         assert!(message(spot(30.0, 20.0)).contains("cone must be"));
         let mut scene = Scene::new();
-        scene.lights = vec![good, spot(20.0, 30.0), PointLight::directional(Vec3::splat(1e30), Vec3::ONE)];
+        scene.lights = vec![good, spot(20.0, 30.0), Light::directional(Vec3::splat(1e30), Vec3::ONE)];
         assert_eq!(scene.validate(), Ok(()));
     }
 }

@@ -18,8 +18,8 @@ use lightmesh::render::{RenderStats, Session, render};
 use lightmesh::scene::generate::forest::Forest;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
 use lightmesh::scene::{
-    Camera, Falloff, Instance, LightShape, Material, PointLight, Positions, Scene, SurfacePoint,
-    TriangleMaterials, TriangleMesh,
+    Camera, Falloff, Instance, Light, LightKind, Material, Positions, Scene, SurfacePoint, TriangleMaterials,
+    TriangleMesh,
 };
 use lightmesh::settings::{Integrator, Settings};
 
@@ -63,7 +63,7 @@ impl Builder {
         }
     }
 
-    pub fn scene(self, materials: Vec<Material>, lights: Vec<PointLight>, falloff: Falloff) -> Scene {
+    pub fn scene(self, materials: Vec<Material>, lights: Vec<Light>, falloff: Falloff) -> Scene {
         let mesh = TriangleMesh {
             name: String::new(),
             positions: Positions::new(self.positions),
@@ -88,8 +88,8 @@ pub fn grey(diffuse: f32) -> Material {
     Material { diffuse: Vec3::splat(diffuse), ..Material::default() }
 }
 
-pub fn light(position: Vec3, intensity: Vec3) -> PointLight {
-    PointLight { position, intensity, shape: LightShape::Point }
+pub fn light(position: Vec3, intensity: Vec3) -> Light {
+    Light { position, intensity, kind: LightKind::Point }
 }
 
 pub fn camera(position: Vec3, look_at: Vec3, vertical_fov: f32) -> Camera {

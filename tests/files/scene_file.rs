@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::Vec3;
 use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::scene::load::{LoadError, LoadedScene, load_scene_file};
-use lightmesh::scene::{Falloff, LightShape, TriangleMaterials};
+use lightmesh::scene::{Falloff, LightKind, TriangleMaterials};
 use lightmesh::settings::{
     Estimator, IndirectForm, Integrator, Leaks, Neighbourhood, Normalization, PointLayout, Radius, Resolve,
     Spacing,
@@ -359,8 +359,7 @@ fn random_lights_vary_in_colour_within_the_range() {
 #[test]
 fn spot_lights_have_their_cones() {
     let table = "[[light]]\nposition = [0, 3, 0]\ndirection = [0, -2, 0]\ncone = [30, 60]\nintensity = 1";
-    let LightShape::Spot { direction, inner_cosine, outer_cosine } = loaded(table).scene.lights[0].shape
-    else {
+    let LightKind::Spot { direction, inner_cosine, outer_cosine } = loaded(table).scene.lights[0].kind else {
         panic!("no spot light");
     };
     assert_eq!(direction, Vec3::NEG_Y);

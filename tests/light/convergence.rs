@@ -1,4 +1,4 @@
-//! `per-light` converges to the conventional picture as R and the spacing go to 0 (spec §13).
+//! `per-light` converges to the conventional picture as R and the spacing go to 0 (method §13).
 
 use glam::Vec3;
 use lightmesh::scene::Falloff;

@@ -1,4 +1,4 @@
-//! The estimators compute the formulas that they are named after: eqs. (1), (2), (3) and spec §4, on numbers worked
+//! The estimators compute the formulas that they are named after: eqs. (1), (2), (3) and method §4, on numbers worked
 //! out by hand.
 
 use std::sync::Arc;

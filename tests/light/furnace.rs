@@ -1,4 +1,4 @@
-//! A closed white furnace settles at e/(1 − ρ) everywhere (spec §5).
+//! A closed white furnace settles at e/(1 − ρ) everywhere (method §5).
 
 use glam::Vec3;
 use lightmesh::scene::{Falloff, Material};

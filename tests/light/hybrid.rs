@@ -1,4 +1,4 @@
-//! Hybrid shadows are the conventional tracer's for a fraction of its rays (spec §4).
+//! Hybrid shadows are the conventional tracer's for a fraction of its rays (method §4).
 
 use glam::Vec3;
 use lightmesh::image::Image;

@@ -1,4 +1,4 @@
-//! A mesh point is evaluated at most once in its life, and only if a surface point asks for it (spec §9).
+//! A mesh point is evaluated at most once in its life, and only if a surface point asks for it (method §9).
 
 use std::collections::HashMap;
 use std::sync::Mutex;

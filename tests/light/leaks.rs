@@ -1,4 +1,4 @@
-//! No light through walls: a dark room beside a bright one stays dark (spec §3, §8).
+//! No light through walls: a dark room beside a bright one stays dark (method §3, §8).
 
 use glam::Vec3;
 use lightmesh::scene::{Camera, Falloff, Scene};

@@ -1,4 +1,4 @@
-//! The penumbra of `sphere` is the one that analysis gives (spec §13).
+//! The penumbra of `sphere` is the one that analysis gives (method §13).
 
 use glam::{Quat, Vec3};
 use lightmesh::scene::Falloff;

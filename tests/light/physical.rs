@@ -1,4 +1,4 @@
-//! The physical preset gives what a path tracer gives (spec §12), held against pictures that Mitsuba rendered.
+//! The physical preset gives what a path tracer gives (method §12), held against pictures that Mitsuba rendered.
 //!
 //! The pictures are not part of this repository: they are looked for in `../shared/references`, or where
 //! `LIGHTMESH_REFERENCES` points to.

@@ -12,7 +12,7 @@ use lightmesh::image::tone::auto_exposure;
 use lightmesh::light_mesh::direct::DirectMesh;
 use lightmesh::light_mesh::points::Neighbours;
 use lightmesh::scene::load::{LoadedScene, open_scene};
-use lightmesh::scene::{CameraRays, Interaction, PointLight, Ray, Scene};
+use lightmesh::scene::{CameraRays, Interaction, Light, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 
 use crate::common::{backend, conventional, picture};
@@ -47,7 +47,7 @@ fn visible<A: Accel>(accel: &A, loaded: &LoadedScene) -> Vec<Option<Interaction>
 }
 
 /// k_d/π · φ2 · E/φ1: what a light adds to a pixel if it is seen.
-fn share(scene: &Scene, light: &PointLight, surface: &Interaction) -> Vec3 {
+fn share(scene: &Scene, light: &Light, surface: &Interaction) -> Vec3 {
     let y = &surface.point;
     let offset = light.position - y.position;
     let cosine = y.shading_normal.dot(offset.normalize_or_zero()).max(0.0);
@@ -59,7 +59,7 @@ fn share(scene: &Scene, light: &PointLight, surface: &Interaction) -> Vec3 {
 /// would add is a bound of the pixel's error: there is none where all of D_y agrees with y.
 ///
 /// At half the spacing the bands along shadow edges in which D_y disagrees are half as wide, so that the mean error is
-/// halved too (spec §13: L1 = O(R)) once D_y is smaller than what casts the shadows, and falls more slowly before. Beside a
+/// halved too (method §13: L1 = O(R)) once D_y is smaller than what casts the shadows, and falls more slowly before. Beside a
 /// lamp the inverse square has no bound: values count up to the white of the picture.
 fn errs_only_where_the_spacing_explains_it(model: &str, lights: usize, coarsest: f32) {
     let Some(loaded) = opened(model) else { return };
@@ -111,8 +111,8 @@ fn check_bounds(
         let Some(seen) = seen else { continue };
         let y = &seen.point;
         shading.neighbourhoods.find(points, y, &mut neighbours);
-        let sees = |from: Vec3, light: &PointLight| !backend.occluded(&Ray::between(from, light.position));
-        let disagrees = |light: &&PointLight| {
+        let sees = |from: Vec3, light: &Light| !backend.occluded(&Ray::between(from, light.position));
+        let disagrees = |light: &&Light| {
             let truth = sees(y.ray_origin(), light);
             neighbours.ids().iter().any(|&id| sees(points.position(id), light) != truth)
         };

@@ -7,7 +7,7 @@ use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::image::Image;
 use lightmesh::render::render;
 use lightmesh::scene::{
-    Camera, Falloff, Instance, Material, PointLight, Positions, Scene, TriangleMaterials, TriangleMesh,
+    Camera, Falloff, Instance, Light, Material, Positions, Scene, TriangleMaterials, TriangleMesh,
 };
 use lightmesh::settings::{Integrator, KernelSettings, Leaks, Neighbourhood, Radius, Settings, Spacing};
 
@@ -39,7 +39,7 @@ fn half_plane() -> Scene {
         ],
         instances: vec![Instance { mesh: 0, to_world: None }, Instance { mesh: 1, to_world: None }],
         materials: vec![Material { diffuse: Vec3::ONE, ..Material::default() }],
-        lights: vec![PointLight::point(LIGHT, Vec3::ONE)],
+        lights: vec![Light::point(LIGHT, Vec3::ONE)],
         falloff: Falloff::None,
         background: Vec3::ZERO,
     }
@@ -85,7 +85,7 @@ fn ground(column: usize, row: usize) -> Vec3 {
 }
 
 /// The shadow's plane is vertical, so that the visible share of the half ball over a ground point at distance s of the
-/// edge is that of the whole ball: (2 + 3t − t³)/4 with t = s/R (spec §13), whatever the height of the occluder.
+/// edge is that of the whole ball: (2 + 3t − t³)/4 with t = s/R (method §13), whatever the height of the occluder.
 #[test]
 fn the_penumbra_of_an_edge_has_its_analytic_profile() {
     let image = picture(&settings(Integrator::Reference, Neighbourhood::Sphere, 0.5));

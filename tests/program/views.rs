@@ -4,7 +4,7 @@ use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::choose_view;
 use lightmesh::scene::load::{LoadedScene, OpenedScene, Skipped};
-use lightmesh::scene::{Falloff, LightShape, Material, Scene};
+use lightmesh::scene::{Falloff, LightKind, Material, Scene};
 use lightmesh::settings::Settings;
 
 use crate::common::{Builder, grey};
@@ -48,7 +48,7 @@ fn a_closed_room_is_seen_and_lit_from_inside() {
     let loaded = viewed(room(), BackendChoice::Bvh);
     assert!(is_inside(&loaded.scene, loaded.cameras[0].position), "{:?}", loaded.cameras[0]);
     for light in &loaded.scene.lights {
-        assert!(light.shape == LightShape::Point && is_inside(&loaded.scene, light.position), "{light:?}");
+        assert!(light.kind == LightKind::Point && is_inside(&loaded.scene, light.position), "{light:?}");
     }
 }
 
@@ -130,7 +130,7 @@ fn a_thing_is_seen_from_outside() {
     builder.cuboid(Vec3::new(0.5, 1.0, 0.25), Vec3::new(1.0, 2.0, 0.75), false, 0);
     let loaded = viewed(builder, BackendChoice::Bvh);
     assert!(!is_inside(&loaded.scene, loaded.cameras[0].position));
-    assert!(loaded.scene.lights.iter().all(|light| matches!(light.shape, LightShape::Directional { .. })));
+    assert!(loaded.scene.lights.iter().all(|light| matches!(light.kind, LightKind::Directional { .. })));
 }
 
 /// The view is a property of the model: it is chosen again as it was, and by what any backend's rays find.

@@ -1,4 +1,4 @@
-//! Irradiance by normal from second-order harmonics: the directional basis of spec §4.
+//! Irradiance by normal from second-order harmonics: the directional basis of method §4.
 //!
 //! Light of weight 1 from direction ω irradiates a surface of normal n with max(0, n·ω). Cut off after
 //! second-order spherical harmonics (Ramamoorthi and Hanrahan, 2001) this is 1/4 + (n·ω)/2 + 5/32·(3(n·ω)² − 1), a

@@ -1,4 +1,4 @@
-//! Irradiance tabulated by normal: what indirect mesh points keep in their directional form (spec §5).
+//! Irradiance tabulated by normal: what indirect mesh points keep in their directional form (method §5).
 //!
 //! The normals are the vertices of an octahedron whose faces are divided into triangles, laid out as a square by the
 //! octahedral map (Cigolle et al., "A survey of efficient representations for independent unit vectors", 2014). Between

@@ -1,4 +1,4 @@
-//! Regular point sets: positions by arithmetic, neighbours without a search (spec §8).
+//! Regular point sets: positions by arithmetic, neighbours without a search (method §8).
 
 use glam::{IVec3, Vec3};
 

@@ -14,7 +14,7 @@ const PER_CELL: f32 = 4.0;
 /// Cells along an axis at most.
 const MOST_CELLS: f32 = 1024.0;
 
-/// Mesh points at given positions (spec §8).
+/// Mesh points at given positions (method §8).
 #[derive(Clone, Debug)]
 pub struct PointList {
     origin: Vec3,

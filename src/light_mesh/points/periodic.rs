@@ -1,4 +1,4 @@
-//! Point sets that repeat: body-centred cubic, jittered and blue-noise (spec §8).
+//! Point sets that repeat: body-centred cubic, jittered and blue-noise (method §8).
 //!
 //! A tile of 8×8×8 spacings holds 512 (body-centred: 1,024) points and repeats along the axes, so that a set of any extent
 //! has arithmetic positions and lookups and takes no memory.

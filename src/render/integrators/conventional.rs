@@ -1,4 +1,4 @@
-//! The conventional tracer (spec §10): one occlusion ray per light at every surface point.
+//! The conventional tracer (method §10): one occlusion ray per light at every surface point.
 
 use glam::Vec3;
 use pulp::NullaryFnOnce;

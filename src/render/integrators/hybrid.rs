@@ -1,4 +1,4 @@
-//! Hybrid shadows (spec §4): where the points of D_y agree about a light, their answer stands; where they disagree, an
+//! Hybrid shadows (method §4): where the points of D_y agree about a light, their answer stands; where they disagree, an
 //! occlusion ray from the surface point gives it.
 //!
 //! Agreement may still be wrong: an occluder thinner than the spacing, or close to the surface, can miss all of D_y. A few

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
 use crate::Bounds;
-use crate::scene::{Falloff, LightShape, PointLight, Scene};
+use crate::scene::{Falloff, Light, LightKind, Scene};
 use crate::settings::{Radius, Resolve, Settings, Spacing};
 
 /// What a file holds, and what was chosen for it.
@@ -65,7 +65,7 @@ const NEIGHBOURS: usize = 1000;
 
 /// Distance between mesh points: a quarter of the distance between neighbouring lights, within a range that follows
 /// from the scene's size. Shadow edges are traced, so that it decides on speed more than on sharpness.
-fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
+fn spacing(bounds: Bounds, lights: &[Light]) -> f32 {
     let diagonal = bounds.extent().length();
     if diagonal <= 0.0 {
         return 1.0;
@@ -73,7 +73,7 @@ fn spacing(bounds: Bounds, lights: &[PointLight]) -> f32 {
     let [most, middle, least] = SPACING_RANGE.map(|part| part * diagonal);
     let local: Vec<Vec3> = lights
         .iter()
-        .filter(|light| !matches!(light.shape, LightShape::Directional { .. }))
+        .filter(|light| !matches!(light.kind, LightKind::Directional { .. }))
         .map(|light| light.position)
         .take(NEIGHBOURS)
         .collect();

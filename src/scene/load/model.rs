@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Skipped, Warning};
-use crate::scene::{Camera, Instance, Material, PointLight, TriangleMesh};
+use crate::scene::{Camera, Instance, Light, Material, TriangleMesh};
 
 /// What one model file holds.
 #[derive(Clone, Default)]
@@ -17,7 +17,7 @@ pub struct Model {
     /// Named runs of triangles, for material overrides.
     pub parts: Vec<Part>,
     /// Lights of the file.
-    pub lights: Vec<PointLight>,
+    pub lights: Vec<Light>,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
     /// Elements of the file that were left out, counted.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, DMat3, Mat3A, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{Camera, LightShape, PointLight, Positions, TriangleMesh};
+use crate::scene::{Camera, Light, LightKind, Positions, TriangleMesh};
 
 /// Whether directions survive a linear map.
 pub fn is_invertible(linear: &Mat3A) -> bool {
@@ -32,16 +32,16 @@ pub fn move_mesh(mesh: &mut TriangleMesh, to_world: &Affine3A) {
 }
 
 /// A light in another place; its intensity is that of the file whatever the scale.
-pub fn moved_light(light: &PointLight, to_world: &Affine3A) -> PointLight {
+pub fn moved_light(light: &Light, to_world: &Affine3A) -> Light {
     let turned = |direction: Vec3| to_world.transform_vector3(direction).normalize_or(direction);
-    let shape = match light.shape {
-        LightShape::Point => LightShape::Point,
-        LightShape::Spot { direction, inner_cosine, outer_cosine } => {
-            LightShape::Spot { direction: turned(direction), inner_cosine, outer_cosine }
+    let kind = match light.kind {
+        LightKind::Point => LightKind::Point,
+        LightKind::Spot { direction, inner_cosine, outer_cosine } => {
+            LightKind::Spot { direction: turned(direction), inner_cosine, outer_cosine }
         }
-        LightShape::Directional { direction } => LightShape::Directional { direction: turned(direction) },
+        LightKind::Directional { direction } => LightKind::Directional { direction: turned(direction) },
     };
-    PointLight { position: to_world.transform_point3(light.position), shape, ..*light }
+    Light { position: to_world.transform_point3(light.position), kind, ..*light }
 }
 
 /// A camera in another place.

@@ -2,13 +2,13 @@
 
 use glam::{Affine3A, DAffine3, DMat4, DQuat, DVec3, Vec3};
 use gltf_json::Node;
-use gltf_json::extensions::scene::khr_lights_punctual::{Light, Type};
+use gltf_json::extensions::scene::khr_lights_punctual::{Light as PunctualLight, Type};
 use gltf_json::validation::Checked;
 use serde_json::Value;
 
 use super::document::Document;
 use crate::scene::load::{LoadError, Warning};
-use crate::scene::{Camera, LightShape, PointLight};
+use crate::scene::{Camera, Light, LightKind};
 
 /// A node of the scene with its place in it.
 pub struct PlacedNode {
@@ -125,7 +125,7 @@ impl Document<'_> {
     ///
     /// # Errors
     /// [`LoadError::Invalid`].
-    pub fn light(&self, placed: &PlacedNode) -> Result<Option<PointLight>, LoadError> {
+    pub fn light(&self, placed: &PlacedNode) -> Result<Option<Light>, LoadError> {
         let extension = self.root.nodes[placed.index].extensions.as_ref();
         let Some(reference) = extension.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) else {
             return Ok(None);
@@ -145,14 +145,14 @@ impl Document<'_> {
         let position = placed.to_world.translation.as_vec3();
         let direction = (placed.to_world.matrix3 * DVec3::NEG_Z).try_normalize();
         let direction = direction.unwrap_or(DVec3::NEG_Z).as_vec3();
-        let shape = self.shape(light, direction, &place)?;
-        Ok(Some(PointLight { position, intensity, shape }))
+        let kind = self.kind(light, direction, &place)?;
+        Ok(Some(Light { position, intensity, kind }))
     }
 
-    fn shape(&self, light: &Light, direction: Vec3, place: &str) -> Result<LightShape, LoadError> {
+    fn kind(&self, light: &PunctualLight, direction: Vec3, place: &str) -> Result<LightKind, LoadError> {
         match light.type_ {
-            Checked::Valid(Type::Point) => Ok(LightShape::Point),
-            Checked::Valid(Type::Directional) => Ok(LightShape::Directional { direction }),
+            Checked::Valid(Type::Point) => Ok(LightKind::Point),
+            Checked::Valid(Type::Directional) => Ok(LightKind::Directional { direction }),
             Checked::Valid(Type::Spot) => {
                 let (inner, outer) = light.spot.as_ref().map_or((0.0, std::f32::consts::FRAC_PI_4), |spot| {
                     (spot.inner_cone_angle, spot.outer_cone_angle)
@@ -163,7 +163,7 @@ impl Document<'_> {
                         format!("0 ≤ innerConeAngle ≤ outerConeAngle ≤ π/2 needed: {inner}, {outer}");
                     return Err(self.error(place, problem));
                 }
-                Ok(LightShape::Spot { direction, inner_cosine: inner.cos(), outer_cosine: outer.cos() })
+                Ok(LightKind::Spot { direction, inner_cosine: inner.cos(), outer_cosine: outer.cos() })
             }
             Checked::Invalid => Err(self.error(place, "its type is unknown".to_owned())),
         }

@@ -8,7 +8,7 @@ use super::place::Places;
 use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point};
 use crate::sampling::SplitMix64;
 use crate::scene::load::LoadError;
-use crate::scene::{Falloff, PointLight};
+use crate::scene::{Falloff, Light};
 use crate::settings::named_enum;
 
 /// Lights that one table may lay out.
@@ -82,7 +82,7 @@ pub fn falloff(
 
 impl LightTable {
     /// The light: a position makes a point light, a direction a directional one, both together a spot.
-    pub fn light(table: &Spanned<Self>, index: usize, places: &Places) -> Result<PointLight, LoadError> {
+    pub fn light(table: &Spanned<Self>, index: usize, places: &Places) -> Result<Light, LoadError> {
         let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
         let Self { position, direction, cone, intensity } = table.get_ref();
         if cone.is_some() && (position.is_none() || direction.is_none()) {
@@ -95,11 +95,11 @@ impl LightTable {
                 error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90")
             }
             (None, None) => error("needs a position or a direction"),
-            (Some(position), None) => Ok(PointLight::point(position, intensity)),
+            (Some(position), None) => Ok(Light::point(position, intensity)),
             (Some(position), Some(direction)) => {
-                Ok(PointLight::spot(position, direction, [inner, outer], intensity))
+                Ok(Light::spot(position, direction, [inner, outer], intensity))
             }
-            (None, Some(direction)) => Ok(PointLight::directional(direction, intensity)),
+            (None, Some(direction)) => Ok(Light::directional(direction, intensity)),
         }
     }
 }
@@ -132,7 +132,7 @@ impl LightBoxTable {
         table: &Spanned<Self>,
         index: usize,
         places: &Places,
-    ) -> Result<impl Iterator<Item = PointLight> + use<>, LoadError> {
+    ) -> Result<impl Iterator<Item = Light> + use<>, LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_box[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
@@ -144,7 +144,7 @@ impl LightBoxTable {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
-            PointLight::point(position, each * tint)
+            Light::point(position, each * tint)
         }))
     }
 }
@@ -155,7 +155,7 @@ impl LightGridTable {
         table: &Spanned<Self>,
         index: usize,
         places: &Places,
-    ) -> Result<impl Iterator<Item = PointLight> + use<>, LoadError> {
+    ) -> Result<impl Iterator<Item = Light> + use<>, LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_grid[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
@@ -170,7 +170,7 @@ impl LightGridTable {
         Ok((0..count).map(move |i| {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
-            PointLight::point(position, each)
+            Light::point(position, each)
         }))
     }
 }

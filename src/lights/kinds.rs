@@ -1,34 +1,34 @@
 //! What spot and directional lights differ in from point lights, sixteen at a time.
 
 use super::falloff::FalloffLaw;
-use crate::scene::LightShape;
+use crate::scene::LightKind;
 use crate::simd::{LANES, Lanes};
 
 /// Spot and directional lights of a chunk; lanes with point lights hold what changes nothing.
 #[derive(Clone, Debug)]
-pub(super) struct ShapeLanes {
+pub(super) struct KindLanes {
     /// 0 for directional lights, 1 for the others: what the lit point is multiplied by before the way to the light
     /// is taken.
     pub local: Lanes,
     /// The cone's axis.
     axis: [Lanes; 3],
-    /// Terms of [`LightShape::cone_terms`].
+    /// Terms of [`LightKind::cone_terms`].
     slope: Lanes,
     offset: Lanes,
 }
 
-impl ShapeLanes {
+impl KindLanes {
     pub const POINTS: Self =
         Self { local: [1.0; LANES], axis: [[0.0; LANES]; 3], slope: [0.0; LANES], offset: [1.0; LANES] };
 
-    pub fn set(&mut self, lane: usize, shape: LightShape) {
-        (self.slope[lane], self.offset[lane]) = shape.cone_terms();
-        match shape {
-            LightShape::Point => {}
-            LightShape::Spot { direction, .. } => {
+    pub fn set(&mut self, lane: usize, kind: LightKind) {
+        (self.slope[lane], self.offset[lane]) = kind.cone_terms();
+        match kind {
+            LightKind::Point => {}
+            LightKind::Spot { direction, .. } => {
                 (0..3).for_each(|axis| self.axis[axis][lane] = direction[axis]);
             }
-            LightShape::Directional { .. } => self.local[lane] = 0.0,
+            LightKind::Directional { .. } => self.local[lane] = 0.0,
         }
     }
 
