@@ -11,7 +11,7 @@ use glam::{Vec3, Vec4};
 use lightmesh::World;
 use lightmesh::accel::{Accel, BvhAccel, Coherence, PacketLanes, RayPacket};
 use lightmesh::light_mesh::direct::{
-    Basis, DirectField, DirectMesh, DirectShading, DirectView, spherical_harmonics,
+    Basis, DirectField, DirectInterpolation, DirectMesh, DirectView, spherical_harmonics,
 };
 use lightmesh::light_mesh::lookup::{Lookup, LookupScratch};
 use lightmesh::light_mesh::points::Neighbours;
@@ -74,7 +74,7 @@ fn surfaces() -> Vec<SurfacePoint> {
 }
 
 /// A mesh of spacing 1/20 over the scene of a number of lights, read with R of `spacings` spacings.
-fn mesh(lights: usize, spacings: f32, estimator: Estimator) -> (DirectMesh, DirectShading) {
+fn mesh(lights: usize, spacings: f32, estimator: Estimator) -> (DirectMesh, DirectInterpolation) {
     let points = PointSettings { spacing: Spacing::Units(Vec3::splat(0.05)), ..PointSettings::default() };
     let kernel = KernelSettings {
         radius: Radius::Spacings(spacings),
@@ -82,7 +82,7 @@ fn mesh(lights: usize, spacings: f32, estimator: Estimator) -> (DirectMesh, Dire
         ..KernelSettings::default()
     };
     let mut mesh = DirectMesh::new(scene(lights).bounds());
-    let shading = mesh.shading(&points, &kernel, estimator).expect("a modest grid");
+    let shading = mesh.interpolation(&points, &kernel, estimator).expect("a modest grid");
     (mesh, shading)
 }
 

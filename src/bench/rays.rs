@@ -109,7 +109,7 @@ fn mesh_points(
         ..KernelSettings::default()
     };
     let mut mesh = DirectMesh::new(scene.bounds());
-    let shading = mesh.shading(&points, &kernel, Estimator::PerLight).map_err(RenderError::from)?;
+    let shading = mesh.interpolation(&points, &kernel, Estimator::PerLight).map_err(RenderError::from)?;
     let middle = SurfacePoint::flat(scene.bounds().center(), Vec3::Y);
     let needed = mesh.view(lights, &shading).lookup.needed_anywhere([middle].iter());
     let emissive = EmissiveTriangles::default();

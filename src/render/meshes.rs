@@ -1,10 +1,10 @@
-//! The light meshes of a scene, and how one render reads them.
+//! The light meshes of a scene, and how one render interpolates them.
 
 use glam::Vec3;
 
 use crate::Bounds;
-use crate::light_mesh::direct::{DirectMesh, DirectShading};
-use crate::light_mesh::indirect::{DirectTransport, IndirectMesh, IndirectShadingView};
+use crate::light_mesh::direct::{DirectInterpolation, DirectMesh};
+use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::light_mesh::points::MeshError;
 use crate::scene::Scene;
 use crate::settings::{
@@ -30,7 +30,7 @@ struct IndirectIdentity {
     direct_kernel: KernelSettings,
     estimator: Estimator,
     direct_scale: f32,
-    /// How further bounces read the mesh itself.
+    /// How further bounces interpolate the mesh itself.
     shading: Option<IndirectShading>,
     intensities: Vec<Vec3>,
     background: Vec3,
@@ -53,20 +53,20 @@ impl IndirectIdentity {
     }
 }
 
-/// How one render reads the light meshes.
-pub struct MeshShading {
-    pub(super) direct: DirectShading,
-    pub(super) indirect: Option<IndirectShadingView>,
+/// How one render interpolates the light meshes.
+pub struct MeshInterpolation {
+    pub(super) direct: DirectInterpolation,
+    pub(super) indirect: Option<IndirectInterpolation>,
     /// What I(y) is multiplied by before k_d.
     pub(super) direct_scale: f32,
     /// Whether lights on which mesh points disagree are traced.
     pub(super) hybrid: bool,
 }
 
-impl MeshShading {
+impl MeshInterpolation {
     /// How surfaces send on direct light.
     pub(super) fn transport(&self) -> DirectTransport<'_> {
-        DirectTransport { shading: &self.direct, scale: self.direct_scale }
+        DirectTransport { interpolation: &self.direct, scale: self.direct_scale }
     }
 }
 
@@ -76,14 +76,18 @@ impl LightMeshes {
         Self { direct: DirectMesh::new(bounds), indirect: None, indirect_identity: None }
     }
 
-    /// Makes the meshes ready to be read by these settings. Values stay, but for those of an indirect mesh that other settings
+    /// Makes the meshes ready to be interpolated by these settings. Values stay, but for those of an indirect mesh that other settings
     /// would have made.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub fn shading(&mut self, scene: &Scene, settings: &Settings) -> Result<MeshShading, MeshError> {
+    pub fn interpolation(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+    ) -> Result<MeshInterpolation, MeshError> {
         let shading = &settings.shading;
-        let direct = self.direct.shading(&settings.mesh.direct, &shading.kernel, shading.estimator)?;
+        let direct = self.direct.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator)?;
         let identity = IndirectIdentity::of(settings, scene);
         if self.indirect_identity != identity {
             let bounds = self.direct.store().points.bounds();
@@ -92,10 +96,10 @@ impl LightMeshes {
             self.indirect_identity = identity;
         }
         let indirect = match &mut self.indirect {
-            Some(mesh) => Some(mesh.shading(&shading.indirect)?),
+            Some(mesh) => Some(mesh.interpolation(&shading.indirect)?),
             None => None,
         };
-        Ok(MeshShading {
+        Ok(MeshInterpolation {
             direct,
             indirect,
             direct_scale: shading.direct_scale(),

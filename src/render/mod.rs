@@ -17,7 +17,7 @@ mod trace;
 
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
-pub use meshes::{LightMeshes, MeshShading};
+pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
 pub use session::{RenderError, Session, SessionError, render};
 pub use stats::{MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds};

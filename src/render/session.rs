@@ -207,10 +207,10 @@ fn render_frame<A: Accel>(
         }
         Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
         Integrator::LightMesh => {
-            let shading = meshes.shading(world.scene, settings)?;
+            let interpolation = meshes.interpolation(world.scene, settings)?;
             let counters = &mut stats.mesh_points;
-            counters.direct.total = shading.direct.neighbourhoods.count(&meshes.direct.store().points);
-            if let (Some(mesh), Some(view)) = (&mut meshes.indirect, &shading.indirect) {
+            counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);
+            if let (Some(mesh), Some(view)) = (&mut meshes.indirect, &interpolation.indirect) {
                 counters.indirect.total = view.neighbourhoods.count(&mesh.store().points);
                 // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
                 let mut needed = Vec::new();
@@ -223,13 +223,13 @@ fn render_frame<A: Accel>(
                 timed(&mut seconds, || {
                     let needed = PointMask::union(needed);
                     stats.mesh_points.indirect.needed += needed.len();
-                    let transport = shading.transport();
+                    let transport = interpolation.transport();
                     stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
                 });
                 stats.seconds.mesh = seconds;
             }
-            let image =
-                frame.run(&mut LightMeshIntegrator { world, meshes, shading: &shading }, &mut stats)?;
+            let image = frame
+                .run(&mut LightMeshIntegrator { world, meshes, interpolation: &interpolation }, &mut stats)?;
             stats.light_mesh_bytes = meshes.memory_bytes() as u64;
             image
         }

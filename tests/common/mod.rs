@@ -142,7 +142,7 @@ pub fn direct_illumination(scene: &Scene, settings: &Settings, surfaces: &[Surfa
     with_world(scene, |world| {
         let mut mesh = DirectMesh::new(scene.bounds());
         let shading = &settings.shading;
-        let shading = mesh.shading(&settings.mesh.direct, &shading.kernel, shading.estimator);
+        let shading = mesh.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator);
         let shading = shading.expect("a light mesh");
         let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
         mesh.evaluate(world, &shading, &needed);

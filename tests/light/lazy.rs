@@ -118,16 +118,16 @@ fn no_occlusion_ray_is_traced_twice() {
     let world = World { accel: &witness, scene, lights: &lights, emissive: &emissive };
     let mut direct = DirectMesh::new(scene.bounds());
     let Settings { mesh, shading, .. } = &settings;
-    let reading = direct.shading(&mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let reading = direct.interpolation(&mesh.direct, &shading.kernel, shading.estimator).unwrap();
     let mut indirect = IndirectMesh::new(scene.bounds(), mesh.indirect.as_ref().unwrap());
-    let reading_indirect = indirect.shading(&shading.indirect).unwrap();
+    let reading_indirect = indirect.interpolation(&shading.indirect).unwrap();
     let (mut rays, mut evaluated) = (0, 0);
     for (from, to) in [(-20, 5), (-5, 20), (-20, 20)] {
         let surfaces = on_the_ground(from, to);
         let needed = direct.view(&lights, &reading).lookup.needed_anywhere(surfaces.iter());
         let counted = direct.evaluate(world, &reading, &needed);
         let needed = indirect.view(&reading_indirect).lookup.needed_anywhere(surfaces.iter());
-        let transport = DirectTransport { shading: &reading, scale: 1.0 };
+        let transport = DirectTransport { interpolation: &reading, scale: 1.0 };
         let of_indirect = indirect.evaluate(world, &mut direct, transport, &reading_indirect, needed);
         assert_eq!((of_indirect.shadow, counted.inside), (0, 0));
         rays += counted.shadow + of_indirect.direct.shadow;

@@ -15,3 +15,4 @@ mod physical;
 mod real_scenes;
 mod reference;
 mod rows;
+mod session;

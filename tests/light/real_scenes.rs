@@ -101,7 +101,7 @@ fn check_bounds(
     let scene = &loaded.scene;
     let mut mesh = DirectMesh::new(scene.bounds());
     let shading = &settings.shading;
-    let shading = mesh.shading(&settings.mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let shading = mesh.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator).unwrap();
     let points = &mesh.store().points;
     let mut neighbours = Neighbours::default();
     let (mut checked, mut agreeing) = (0, 0);

@@ -39,7 +39,7 @@ fn compare_rows(world: World<BvhAccel>, surfaces: &[SurfacePoint]) {
                 let points = PointSettings { spacing, ..PointSettings::default() };
                 let kernel = KernelSettings { leaks, neighbourhood, ..KernelSettings::default() };
                 let mut mesh = DirectMesh::new(world.scene.bounds());
-                let shading = mesh.shading(&points, &kernel, estimator).unwrap();
+                let shading = mesh.interpolation(&points, &kernel, estimator).unwrap();
                 let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
                 mesh.evaluate(world, &shading, &needed);
                 let view = mesh.view(world.lights, &shading);

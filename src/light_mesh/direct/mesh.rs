@@ -19,14 +19,14 @@ use crate::simd::{LANES, horizontal_extremes, horizontal_sums};
 use crate::world::World;
 
 /// Direct light mesh: points and the field at those that are known. It belongs to one scene's geometry and to its lights'
-/// places and kinds; how surface points read it is no part of it.
+/// places and kinds; how surface points interpolate it is no part of it.
 pub struct DirectMesh {
     store: PointStore,
     field: DirectField,
 }
 
-/// How surface points read a direct mesh.
-pub struct DirectShading {
+/// How surface points interpolate a direct mesh.
+pub struct DirectInterpolation {
     /// The kernel.
     pub neighbourhoods: Neighbourhoods,
     /// Which points of D_y count.
@@ -61,34 +61,34 @@ impl DirectMesh {
         Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
     }
 
-    /// What it takes to read the mesh by these settings; the points that they ask for become points of the mesh.
+    /// What it takes to interpolate the mesh by these settings; the points that they ask for become points of the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub fn shading(
+    pub fn interpolation(
         &mut self,
         points: &PointSettings,
         kernel: &KernelSettings,
         estimator: Estimator,
-    ) -> Result<DirectShading, MeshError> {
+    ) -> Result<DirectInterpolation, MeshError> {
         let set = &mut self.store.points;
         let neighbourhoods = Neighbourhoods::new(set, points, kernel, Neighbourhoods::AUTO_SPACINGS)?;
-        Ok(DirectShading { neighbourhoods, leaks: kernel.leaks, estimator })
+        Ok(DirectInterpolation { neighbourhoods, leaks: kernel.leaks, estimator })
     }
 
-    /// Evaluates those of the needed points that are unknown, and whatever `shading` reads of all known ones beside.
+    /// Evaluates those of the needed points that are unknown, and whatever `interpolation` reads of all known ones beside.
     pub fn evaluate<A: Accel>(
         &mut self,
         world: World<A>,
-        shading: &DirectShading,
+        interpolation: &DirectInterpolation,
         needed: &PointMask,
     ) -> DirectEvaluation {
         let Self { store, field } = self;
         let new = store.allocate(needed);
         let evaluated = new.len() as u64;
         let shadow = field.trace(world.accel, world.lights, new);
-        field.derive(world.lights, Basis::of(shading.estimator), store.positions());
-        let inside = if shading.leaks == Leaks::Invalidate {
+        field.derive(world.lights, Basis::of(interpolation.estimator), store.positions());
+        let inside = if interpolation.leaks == Leaks::Invalidate {
             store.find_inside(world.accel, world.scene, usize::MAX)
         } else {
             0
@@ -96,9 +96,13 @@ impl DirectMesh {
         DirectEvaluation { evaluated, shadow, inside }
     }
 
-    /// The mesh as surface points read it.
-    pub fn view<'a>(&'a self, lights: &'a PackedLights, shading: &'a DirectShading) -> DirectView<'a> {
-        let DirectShading { neighbourhoods, leaks, estimator } = shading;
+    /// The mesh as surface points interpolate it.
+    pub fn view<'a>(
+        &'a self,
+        lights: &'a PackedLights,
+        interpolation: &'a DirectInterpolation,
+    ) -> DirectView<'a> {
+        let DirectInterpolation { neighbourhoods, leaks, estimator } = interpolation;
         DirectView {
             lookup: Lookup { store: &self.store, neighbourhoods, leaks: *leaks },
             estimator: FieldEstimator { field: &self.field, lights, estimator: *estimator },
@@ -121,7 +125,7 @@ impl DirectMesh {
     }
 }
 
-/// A direct mesh as surface points read it.
+/// A direct mesh as surface points interpolate it.
 #[derive(Clone, Copy)]
 pub struct DirectView<'a> {
     /// Finds the points of D_y.

@@ -10,4 +10,4 @@ pub mod spherical_harmonics;
 pub use derived::Basis;
 pub use estimators::FieldEstimator;
 pub use field::DirectField;
-pub use mesh::{DirectEvaluation, DirectMesh, DirectShading, DirectView};
+pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};

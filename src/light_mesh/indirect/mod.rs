@@ -10,12 +10,12 @@ mod patches;
 mod solve;
 mod view;
 
-pub use view::{IndirectShadingView, IndirectView};
+pub use view::{IndirectInterpolation, IndirectView};
 
 use glam::Vec3;
 
 use self::gather::Gathering;
-use super::direct::{DirectEvaluation, DirectMesh, DirectShading};
+use super::direct::{DirectEvaluation, DirectInterpolation, DirectMesh};
 use super::points::{MeshError, Neighbourhoods, PointSet};
 use super::store::{PointMask, PointStore};
 use crate::Bounds;
@@ -36,8 +36,8 @@ pub struct IndirectMesh {
 /// How surfaces send on the direct light that indirect mesh points receive.
 #[derive(Clone, Copy)]
 pub struct DirectTransport<'a> {
-    /// How hits read the direct mesh.
-    pub shading: &'a DirectShading,
+    /// How hits interpolate the direct mesh.
+    pub interpolation: &'a DirectInterpolation,
     /// What I(y) is multiplied by before k_d.
     pub scale: f32,
 }
@@ -70,18 +70,18 @@ impl IndirectMesh {
         }
     }
 
-    /// What it takes to read the mesh by these settings; the points that they ask for become points of the mesh.
+    /// What it takes to interpolate the mesh by these settings; the points that they ask for become points of the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub fn shading(&mut self, shading: &IndirectShading) -> Result<IndirectShadingView, MeshError> {
+    pub fn interpolation(&mut self, shading: &IndirectShading) -> Result<IndirectInterpolation, MeshError> {
         let neighbourhoods = Neighbourhoods::new(
             &mut self.store.points,
             &self.settings.points,
             &shading.kernel,
             Neighbourhoods::AUTO_SPACINGS / IndirectSettings::COARSENESS,
         )?;
-        Ok(IndirectShadingView { neighbourhoods, shading: shading.clone() })
+        Ok(IndirectInterpolation { neighbourhoods, shading: shading.clone() })
     }
 
     /// RGB values per mesh point.
@@ -99,13 +99,13 @@ impl IndirectMesh {
         world: World<A>,
         direct: &mut DirectMesh,
         transport: DirectTransport,
-        shading: &IndirectShadingView,
+        interpolation: &IndirectInterpolation,
         needed: PointMask,
     ) -> IndirectEvaluation {
         let mut evaluation = IndirectEvaluation::default();
         let mut gathering = Gathering::default();
         let mut needed = needed;
-        let leaks = shading.shading.kernel.leaks;
+        let leaks = interpolation.shading.kernel.leaks;
         loop {
             let known = self.store.positions().len();
             let new = self.store.allocate(&needed).to_vec();
@@ -120,12 +120,12 @@ impl IndirectMesh {
             }
             evaluation.evaluated += new.len() as u64;
             evaluation.rays += hits.len() as u64;
-            let lookup = direct.view(world.lights, transport.shading).lookup;
+            let lookup = direct.view(world.lights, transport.interpolation).lookup;
             let direct_needed = self.needed_at(world.scene, &new, &hits, lookup);
             evaluation.direct_needed += direct_needed.len();
-            evaluation.direct.add(direct.evaluate(world, transport.shading, &direct_needed));
+            evaluation.direct.add(direct.evaluate(world, transport.interpolation, &direct_needed));
             needed = if self.settings.bounces > 1 {
-                self.needed_at(world.scene, &new, &hits, self.view(shading).lookup)
+                self.needed_at(world.scene, &new, &hits, self.view(interpolation).lookup)
             } else {
                 PointMask::default()
             };
@@ -136,7 +136,7 @@ impl IndirectMesh {
             evaluation.inside += self.store.find_inside(world.accel, world.scene, usize::MAX);
         }
         if !gathering.points.is_empty() {
-            evaluation.shadow += self.solve(world, direct, transport, shading, &gathering);
+            evaluation.shadow += self.solve(world, direct, transport, interpolation, &gathering);
         }
         evaluation
     }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::gather::{Gathering, POINTS_PER_TASK};
 use super::octahedral::IrradianceSums;
 use super::patches::Patches;
-use super::{DirectTransport, IndirectMesh, IndirectShadingView};
+use super::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::lookup::LookupScratch;
@@ -25,11 +25,11 @@ impl IndirectMesh {
         world: World<A>,
         direct: &DirectMesh,
         transport: DirectTransport,
-        shading: &IndirectShadingView,
+        interpolation: &IndirectInterpolation,
         gathering: &Gathering,
     ) -> u64 {
         let World { accel, scene, lights, emissive } = world;
-        let direct = direct.view(lights, transport.shading);
+        let direct = direct.view(lights, transport.interpolation);
         let first = self.values.len();
         let directions = self.strata.len() as usize;
         let (one_bounce, mut rays) = self.sweep(gathering, |point, sums, scratch| {
@@ -54,7 +54,7 @@ impl IndirectMesh {
             return rays;
         }
         // A quarter of R: a fraction of what the mean over D_y blurs.
-        let width = |surface: &SurfacePoint| 0.25 * shading.neighbourhoods.radius_at(surface.position);
+        let width = |surface: &SurfacePoint| 0.25 * interpolation.neighbourhoods.radius_at(surface.position);
         let patches = Patches::new(gathering.hits.len(), width, |hit| {
             let x = gathering.points[hit / directions];
             let direction = self.strata.jittered((hit % directions) as u32, x);
@@ -63,7 +63,7 @@ impl IndirectMesh {
         let peak =
             |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
         for _ in 1..self.settings.bounces {
-            let view = self.view(shading);
+            let view = self.view(interpolation);
             let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
                 .patches
                 .par_iter()

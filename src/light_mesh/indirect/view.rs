@@ -13,15 +13,15 @@ use crate::light_mesh::points::Neighbourhoods;
 use crate::scene::SurfacePoint;
 use crate::settings::{IndirectForm, IndirectShading, Normalization};
 
-/// How surface points read an indirect mesh.
-pub struct IndirectShadingView {
+/// How surface points interpolate an indirect mesh.
+pub struct IndirectInterpolation {
     /// The kernel.
     pub neighbourhoods: Neighbourhoods,
     /// The settings that it follows from.
     pub shading: IndirectShading,
 }
 
-/// An indirect mesh as surface points read it.
+/// An indirect mesh as surface points interpolate it.
 #[derive(Clone, Copy)]
 pub struct IndirectView<'a> {
     mesh: &'a IndirectMesh,
@@ -31,9 +31,9 @@ pub struct IndirectView<'a> {
 }
 
 impl IndirectMesh {
-    /// The mesh as surface points read it.
-    pub fn view<'a>(&'a self, view: &'a IndirectShadingView) -> IndirectView<'a> {
-        let IndirectShadingView { neighbourhoods, shading } = view;
+    /// The mesh as surface points interpolate it.
+    pub fn view<'a>(&'a self, interpolation: &'a IndirectInterpolation) -> IndirectView<'a> {
+        let IndirectInterpolation { neighbourhoods, shading } = interpolation;
         let lookup = Lookup { store: &self.store, neighbourhoods, leaks: shading.kernel.leaks };
         IndirectView { mesh: self, lookup, shading }
     }

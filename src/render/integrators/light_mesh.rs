@@ -7,7 +7,7 @@ use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
-use crate::render::meshes::{LightMeshes, MeshShading};
+use crate::render::meshes::{LightMeshes, MeshInterpolation};
 use crate::render::need::needed_points;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
@@ -21,8 +21,8 @@ pub struct LightMeshIntegrator<'a, A> {
     pub world: World<'a, A>,
     /// Its light meshes.
     pub meshes: &'a mut LightMeshes,
-    /// How they are read.
-    pub shading: &'a MeshShading,
+    /// How they are interpolated.
+    pub interpolation: &'a MeshInterpolation,
 }
 
 /// Shading of a tile, as work for the best instruction set.
@@ -38,12 +38,13 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let Self { integrator: LightMeshIntegrator { world, meshes, shading }, tile, vertices, light } = self;
+        let Self { integrator: LightMeshIntegrator { world, meshes, interpolation }, tile, vertices, light } =
+            self;
         let accel = world.accel;
-        let direct = meshes.direct.view(world.lights, &shading.direct);
+        let direct = meshes.direct.view(world.lights, &interpolation.direct);
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
-        if shading.hybrid {
+        if interpolation.hybrid {
             counters.shadow_rays = shade_hybrid(accel, direct, tile, vertices, &mut scratch, light);
         } else {
             let mut before = Vec3::NAN;
@@ -62,8 +63,8 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         counters.shadow_rays += scratch.rays;
         counters.direct_fallbacks = scratch.fallbacks;
 
-        light.iter_mut().for_each(|light| *light *= shading.direct_scale);
-        if let (Some(indirect), Some(view)) = (&meshes.indirect, &shading.indirect) {
+        light.iter_mut().for_each(|light| *light *= interpolation.direct_scale);
+        if let (Some(indirect), Some(view)) = (&meshes.indirect, &interpolation.indirect) {
             let indirect = indirect.view(view);
             let mut scratch = LookupScratch::for_tile();
             for (vertex, light) in vertices.iter().zip(light) {
@@ -78,12 +79,12 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
     fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
-        let Self { world, meshes, shading } = self;
+        let Self { world, meshes, interpolation } = self;
         let mut seconds = stats.seconds.mesh;
         timed(&mut seconds, || {
-            let needed = needed_points(paths, meshes.direct.view(world.lights, &shading.direct).lookup);
+            let needed = needed_points(paths, meshes.direct.view(world.lights, &interpolation.direct).lookup);
             stats.mesh_points.direct.needed += needed.len();
-            stats.add_direct(meshes.direct.evaluate(*world, &shading.direct, &needed));
+            stats.add_direct(meshes.direct.evaluate(*world, &interpolation.direct, &needed));
         });
         stats.seconds.mesh = seconds;
     }
