@@ -4,6 +4,7 @@
 mod common;
 
 mod damaged_images;
+mod failed_images;
 mod formats;
 mod generate;
 mod image_io;
