@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "every test program uses a part")]
 
+pub mod data;
+pub mod failed;
 pub mod soup;
 pub mod triangles;
 

@@ -10,7 +10,7 @@ use lightmesh::render::render;
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::load::open_scene;
 
-use crate::common::bits;
+use crate::common::failed::assert_same_bits;
 use crate::common::soup::Soup;
 
 /// Hilly ground with two hundred random triangles above it; coordinates with all the digits that single precision has.
@@ -61,6 +61,6 @@ fn obj_ply_and_gltf_give_the_same_picture() {
         ("big.ply", soup.ply("binary_big_endian")),
         ("model.gltf", soup.gltf().into_bytes()),
     ] {
-        assert!(bits(&picture(name, &content)) == bits(&obj), "{name} differs from model.obj");
+        assert_same_bits(&picture(name, &content), &obj, format_args!("{name} differs from model.obj"));
     }
 }

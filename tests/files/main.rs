@@ -4,11 +4,14 @@
 mod common;
 
 mod damaged_images;
+mod failed_images;
 mod formats;
 mod generate;
 mod image_io;
+mod independent;
 mod malformed;
 mod obj;
+mod openexr;
 mod round_trips;
 mod scene_file;
 mod textures;

@@ -9,6 +9,7 @@ use lightmesh::settings::{
     Estimator, KernelSettings, Leaks, Neighbourhood, PointLayout, Radius, Settings, Spacing,
 };
 
+use crate::common::failed::assert_images;
 use crate::common::{
     Builder, conventional, direct_illumination, forest, grey, light, mean, picture, relative_rmse,
     settings_at, surface_point,
@@ -145,5 +146,6 @@ fn directional_is_close_to_per_light_on_the_forest() {
     settings.shading.estimator = Estimator::Directional;
     let (directional, _) = picture(&loaded.scene, &loaded.cameras[0], &settings);
     let difference = relative_rmse(&directional, &per_light);
-    assert!(difference <= 0.03, "RMSE {difference} of the mean");
+    let problem = format_args!("RMSE {difference} of the mean");
+    assert_images(difference <= 0.03, &directional, &per_light, problem);
 }

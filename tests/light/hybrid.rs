@@ -7,6 +7,7 @@ use lightmesh::scene::generate::interior::Interior;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
 use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Spacing};
 
+use crate::common::failed::assert_images;
 use crate::common::{camera, conventional, forest, grey, light, picture, settings_at};
 
 fn interior() -> LoadedScene {
@@ -31,7 +32,8 @@ fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32
     let differing = traced.pixels().iter().zip(reference.pixels()).filter(|&pair| differ(pair)).count();
     let rays = hybrid.rays.shadow as f64 / conventional.rays.shadow as f64;
     println!("{differing} pixels differ, {rays:.3} of the shadow rays");
-    assert!(differing * 100 <= reference.pixels().len(), "{differing} pixels differ");
+    let few = differing * 100 <= reference.pixels().len();
+    assert_images(few, &traced, &reference, format_args!("{differing} pixels differ"));
     assert!(rays <= share, "{rays} of the conventional shadow rays");
 }
 
@@ -72,6 +74,7 @@ fn occluders_thinner_than_the_spacing_keep_their_shadows() {
     let sky = dark(&picture(&scene, &camera, &lit).0);
     let (shadow, missed) = (sky_and_shadow - sky, sky_and_shadow - found);
     assert!(shadow > 500, "{shadow} pixels of shadow to find");
-    assert!(missed * 20 < shadow, "{missed} of {shadow} pixels of shadow are missed");
+    let problem = format_args!("{missed} of {shadow} pixels of shadow are missed");
+    assert_images(missed * 20 < shadow, &traced, &reference, problem);
     assert!(hybrid.rays.shadow * 2 < conventional.rays.shadow, "{} rays", hybrid.rays.shadow);
 }

@@ -16,6 +16,8 @@ use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::settings::Settings;
 use serde_json::Value;
 
+use crate::common::data::missing;
+use crate::common::failed::assert_images;
 use crate::common::{backend, picture};
 
 fn references() -> Option<PathBuf> {
@@ -24,7 +26,7 @@ fn references() -> Option<PathBuf> {
     if folder.is_dir() {
         Some(folder)
     } else {
-        println!("skipped: there are no reference pictures in {}", folder.display());
+        missing(&format!("there are no reference pictures in {}", folder.display()));
         None
     }
 }
@@ -96,8 +98,9 @@ impl Pair {
         let block_error = metrics.block_mean_relative_error.unwrap();
         let mean_error = metrics.mean.unwrap() / metrics.reference_mean.unwrap() - 1.0;
         println!("{what}: blocks {block_error:.4}, mean {mean_error:+.4}");
-        assert!(block_error <= 0.05, "{what}: mean relative error of block means {block_error}");
-        assert!(mean_error.abs() <= 0.02, "{what}: mean of the image off by {mean_error}");
+        let problem =
+            format!("{what}: mean relative error of block means {block_error}, mean off by {mean_error}");
+        assert_images(block_error <= 0.05 && mean_error.abs() <= 0.02, &self.ours, &self.theirs, problem);
     }
 }
 
@@ -183,10 +186,7 @@ fn the_boards_match_the_path_tracers_and_many_bounces_tint_them() {
         errors[1] += tint(&one.ours, &[*pixel]).distance(theirs) / pixels.len() as f32;
     }
     println!("tint of {} white pixels: off by {errors:?}", pixels.len());
-    assert!(
-        errors[0] < 0.3 * errors[1],
-        "tints are off by {} with many bounces, {} with one",
-        errors[0],
-        errors[1]
-    );
+    let [off, off_with_one] = errors;
+    let problem = format!("tints are off by {off} with many bounces, {off_with_one} with one");
+    assert_images(off < 0.3 * off_with_one, &many.ours, &many.theirs, problem);
 }

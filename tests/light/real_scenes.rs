@@ -3,7 +3,6 @@
 //! Needs the folder of test scenes beside the project.
 
 use std::f32::consts::PI;
-use std::path::Path;
 
 use glam::Vec3;
 use lightmesh::accel::{Accel, Backend};
@@ -15,6 +14,7 @@ use lightmesh::scene::load::{LoadedScene, open_scene};
 use lightmesh::scene::{CameraRays, Interaction, Light, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
 
+use crate::common::data::shared;
 use crate::common::{backend, conventional, picture};
 
 const RESOLUTION: (u32, u32) = (96, 72);
@@ -22,11 +22,7 @@ const RESOLUTION: (u32, u32) = (96, 72);
 /// The scene as it is opened, with plain `per-light` at the spacing that is chosen for it; `None`, and said so, where it
 /// isn't there.
 fn opened(model: &str) -> Option<LoadedScene> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes").join(model);
-    if !file.exists() {
-        println!("skipped: there is no file {}", file.display());
-        return None;
-    }
+    let file = shared(&format!("scenes/{model}"))?;
     let mut loaded = open_scene(&file).unwrap().loaded;
     loaded.settings.view.resolution = RESOLUTION;
     loaded.settings.shading.resolve = Resolve::Average;

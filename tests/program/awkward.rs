@@ -5,30 +5,18 @@
 //! variable `LIGHTMESH_AWKWARD_DIR`.
 
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lightmesh::image;
-use lightmesh::scene::load::ModelFormat;
+
+use crate::common::data::{models_in, shared};
 
 /// Longer than any of the files takes on a slow machine, short enough to call it a hang.
 const LIMIT: Duration = Duration::from_secs(30);
 /// Files beyond this are for benchmarks, not for every test run.
 const LARGEST: u64 = 4 << 20;
-
-fn models_in(folder: &Path, found: &mut Vec<PathBuf>) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            models_in(&path, found);
-        } else if ModelFormat::of(&path).is_some() && entry.metadata().is_ok_and(|m| m.len() <= LARGEST) {
-            found.push(path);
-        }
-    }
-    found.sort();
-}
 
 /// Renders one file in a process of its own; `Err` says which promise was broken.
 fn outcome(model: &Path, folder: &Path) -> Result<(), String> {
@@ -83,16 +71,12 @@ fn outcome(model: &Path, folder: &Path) -> Result<(), String> {
 #[test]
 fn every_file_ends_in_a_picture_or_in_one_line_that_names_it() {
     let mut models = Vec::new();
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    if beside.is_dir() {
-        models_in(&beside, &mut models);
-    } else {
-        println!("skipped: there is no folder {}", beside.display());
-    }
+    models.extend(shared("scenes").iter().flat_map(|folder| models_in(folder)));
     match std::env::var_os("LIGHTMESH_AWKWARD_DIR") {
-        Some(folder) => models_in(Path::new(&folder), &mut models),
+        Some(folder) => models.extend(models_in(Path::new(&folder))),
         None => println!("skipped: LIGHTMESH_AWKWARD_DIR names no further folder"),
     }
+    models.retain(|model| fs::metadata(model).is_ok_and(|metadata| metadata.len() <= LARGEST));
     let folder = tempfile::tempdir().unwrap();
     let broken: Vec<String> = models
         .iter()

@@ -9,6 +9,7 @@ use lightmesh::render::render;
 use lightmesh::scene::{Camera, Falloff, Scene};
 use lightmesh::settings::{Integrator, Resolve, Spacing};
 
+use crate::common::failed::assert_images;
 use crate::common::{Builder, camera, grey, light, settings_at};
 
 const RESOLUTION: (u32, u32) = (96, 72);
@@ -84,10 +85,8 @@ fn a_scene_far_from_the_origin_looks_as_it_does_there() {
                 assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
                 let allowed = 2.0 * 32.0 * f32::EPSILON * distance / 25.0 + 1e-3;
                 let name = backend.name();
-                assert!(
-                    difference <= allowed,
-                    "{name}, {integrator:?}, {distance}: {difference} > {allowed}"
-                );
+                let problem = format!("{name}, {integrator:?}, {distance}: {difference} > {allowed}");
+                assert_images(difference <= allowed, &far, &reference, problem);
             }
         }
     }
@@ -108,6 +107,7 @@ fn details_of_a_huge_scene_look_as_in_a_small_one() {
         let (difference, count) =
             largest_difference(&image, &reference, 1, RESOLUTION.1 / 3..RESOLUTION.1 - 1);
         assert!(count[0] > 1500 && count[1] > 50, "only {count:?} pixels are away from edges");
-        assert!(difference <= 1e-3, "{}: {difference}", of_huge.name());
+        let problem = format!("{}: {difference}", of_huge.name());
+        assert_images(difference <= 1e-3, &image, &reference, problem);
     }
 }

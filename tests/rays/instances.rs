@@ -9,6 +9,7 @@ use lightmesh::render::render;
 use lightmesh::scene::{Falloff, Instance, Positions, Scene, TriangleMesh};
 use lightmesh::settings::{Integrator, Resolve, Spacing};
 
+use crate::common::failed::assert_images;
 use crate::common::{Builder, camera, grey, light, settings_at};
 
 /// Placements that are exact in single precision: a turn, a mirror image, scales of both kinds, and all at once.
@@ -68,7 +69,8 @@ fn assert_same(flat: &Image, instanced: &Image, what: &str) {
     let apart =
         |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * a[c].max(b[c]).max(0.1));
     let differing = flat.pixels().iter().zip(instanced.pixels()).filter(|&pair| apart(pair)).count();
-    assert!(2000 * differing <= flat.pixels().len(), "{what}: {differing} of {} pixels", flat.pixels().len());
+    let (few, all) = (2000 * differing <= flat.pixels().len(), flat.pixels().len());
+    assert_images(few, instanced, flat, format_args!("{what}: {differing} of {all} pixels"));
 }
 
 /// With every backend, an instanced scene and its flattened copy give the same picture: placed by a turn, mirrored, scaled,
