@@ -28,7 +28,7 @@ pub struct CompareArgs {
 
     /// Write a PNG of the errors in false colours: black for none, light yellow for full scale, green for pixels
     /// that are not finite
-    #[arg(long, value_name = "F.png")]
+    #[arg(long, alias = "error-picture", value_name = "F.png")]
     error_image: Option<PathBuf>,
 
     /// Error at full scale of the error image, as a share of the reference's mean
