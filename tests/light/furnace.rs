@@ -25,9 +25,11 @@ fn furnace(
     picture(&scene, &camera, &settings).0.pixels().to_vec()
 }
 
+/// 256 directions integrate a cosine to within about 0.3 %, which the bounces of albedo 0.8 make five times as much: 512 leave
+/// room below the per cent.
 fn indirect(form: IndirectForm) -> IndirectSettings {
     let mut indirect = IndirectSettings {
-        directions: 256,
+        directions: 512,
         bounces: 200,
         tolerance: 1e-4,
         form,
