@@ -23,7 +23,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let render = |what: &str, session: &mut Session, camera: &_, settings: &_| {
         let (_, stats) = session.render(camera, settings)?;
         let points = stats.mesh_points.direct;
-        println!("{what}: {} of {} points are new, {} rays", points.evaluated, points.needed, stats.rays.shadow);
+        println!(
+            "{what}: {} of {} points are new, {} rays",
+            points.evaluated, points.needed, stats.rays.shadow
+        );
         Ok::<(), Box<dyn Error>>(())
     };
     render("first view", &mut session, &camera, &settings)?;

@@ -2,7 +2,8 @@
 
 use super::leaks::{LeakGuard, LeakedPoints};
 use super::points::{CellCache, Kernel, Neighbourhoods, Neighbours, PointPacket, Surroundings};
-use super::store::{NeededPoints, PointMask, PointStore, UNKNOWN};
+use super::slot::UNKNOWN;
+use super::store::{NeededPoints, PointMask, PointStore};
 use crate::accel::Accel;
 use crate::scene::SurfacePoint;
 use crate::settings::Leaks;

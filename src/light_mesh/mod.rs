@@ -16,8 +16,9 @@
 //! | room | what |
 //! |---|---|
 //! | [`points`] | positions and ids, kernels, finding the points of D_y |
+//! | `leaks` | which points of D_y count for a surface point |
 //! | [`store`] | which points are known, and in which slot |
-//! | `leaks`, [`lookup`] | the known points of D_y that count for a surface point |
+//! | [`lookup`] | the known points of D_y that count |
 //! | [`direct`] | visibility of lights at mesh points, and the estimators |
 //! | [`indirect`] | gathering, bounces, irradiance by normal |
 
@@ -26,4 +27,5 @@ pub mod indirect;
 pub mod leaks;
 pub mod lookup;
 pub mod points;
+mod slot;
 pub mod store;

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::VisibilityBits;
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
 use super::kinds::KindLanes;
+use super::visibility::VisibilityBits;
 use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
 

@@ -4,6 +4,7 @@
 //! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate), an
 //! [integrator](integrators)'s `shade`, and [`resolve`].
 
+mod error;
 mod film;
 mod frame;
 pub mod integrators;
@@ -15,11 +16,12 @@ mod surface_group;
 mod tiles;
 mod trace;
 
+pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
-pub use session::{RenderError, Session, SessionError, render};
+pub use session::{Session, render};
 pub use stats::{MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds};
 pub use tiles::Tile;
 pub use trace::{PathVertex, TilePaths, trace_paths};

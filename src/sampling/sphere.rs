@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::mix;
+use super::hash::mix;
 
 /// A partition of the sphere into `N` parts of equal area: zones of equal-area cells.
 ///

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{KernelSettings, Radius, named_enum};
+use super::names::named_enum;
+use super::shading::{KernelSettings, Radius};
 use crate::Bounds;
 
 /// The light meshes.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::IndirectMesh;
+use super::mesh::IndirectMesh;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::leaks::is_inside_by_share;
 use crate::light_mesh::lookup::Lookup;

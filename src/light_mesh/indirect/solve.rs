@@ -6,9 +6,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::gather::{Gathering, POINTS_PER_TASK};
+use super::interpolation::{DirectTransport, IndirectInterpolation};
+use super::mesh::IndirectMesh;
 use super::octahedral::IrradianceSums;
 use super::patches::Patches;
-use super::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::lookup::LookupScratch;

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::{IVec3, Vec3};
 
 use super::kernel::Kernel;
-use crate::light_mesh::store::UNKNOWN;
+use crate::light_mesh::slot::UNKNOWN;
 use crate::simd::{LANES, Lanes};
 
 /// Cells and packets of candidates that are kept before all are forgotten: some megabytes per thread.

@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::cells::{CellCache, PointPacket, Surroundings};
 use super::kernel::Kernel;
-use super::{MeshError, Neighbours, PointSet};
+use super::neighbours::Neighbours;
+use super::point_set::{MeshError, PointSet};
 use crate::Bounds;
 use crate::scene::SurfacePoint;
 use crate::settings::{KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
