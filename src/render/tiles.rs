@@ -13,7 +13,7 @@ pub const TILES_PER_TASK: usize = 1;
 /// Edge of the squares of pixels whose rays form one packet of 16.
 const SQUARE: u32 = 4;
 
-/// A rectangle of at most [`TILE`]×[`TILE`] pixels.
+/// A rectangle of at most 32 × 32 pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Left column.

@@ -40,7 +40,7 @@ impl PointStore {
         &positions[first..]
     }
 
-    /// Slot of a point, or [`UNKNOWN`].
+    /// Slot of a point; `u32::MAX` where it is not known.
     #[inline(always)]
     pub fn slot(&self, id: u64) -> u32 {
         self.slots.slot(id)
