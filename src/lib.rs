@@ -78,9 +78,13 @@ pub mod image;
 pub mod light_mesh;
 pub mod lights;
 pub mod render;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod sampling;
 pub mod scene;
 pub mod settings;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod simd;
 mod world;
 

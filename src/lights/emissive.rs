@@ -73,7 +73,7 @@ impl EmissiveTriangles {
 
     /// Pdf per solid angle at `x` with which one choice of a point finds `surface`, the surface of `hit`.
     #[inline(always)]
-    pub fn pdf(&self, scene: &Scene, x: Vec3, hit: &Hit, surface: &SurfacePoint) -> f32 {
+    pub(crate) fn pdf(&self, scene: &Scene, x: Vec3, hit: &Hit, surface: &SurfacePoint) -> f32 {
         let Some(&total) = self.cumulative.last() else { return 0.0 };
         let way = surface.position - x;
         let distance_squared = way.length_squared();
@@ -87,7 +87,14 @@ impl EmissiveTriangles {
     /// Choice `k` of `count` for the mesh point at `x`, given three random numbers of [0, 1) that belong to `x`; `None`
     /// where it shows a side that doesn't shine.
     #[inline(always)]
-    pub fn sample(&self, scene: &Scene, x: Vec3, k: u32, count: u32, noise: Vec3) -> Option<EmissiveSample> {
+    pub(crate) fn sample(
+        &self,
+        scene: &Scene,
+        x: Vec3,
+        k: u32,
+        count: u32,
+        noise: Vec3,
+    ) -> Option<EmissiveSample> {
         let total = *self.cumulative.last()?;
         let target = f64::from(k as f32 + noise.x) / f64::from(count) * total;
         let index = self.cumulative.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);

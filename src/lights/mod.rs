@@ -7,5 +7,6 @@ mod packed;
 mod visibility;
 
 pub use emissive::EmissiveTriangles;
-pub use packed::{IncidentLights, LightChunk, PackedLights};
-pub use visibility::{VisibilityBits, expand_bits};
+pub use packed::PackedLights;
+pub(crate) use packed::{IncidentLights, LightChunk};
+pub(crate) use visibility::{VisibilityBits, expand_bits};

@@ -88,7 +88,7 @@ impl PackedLights {
 
     /// The chunks.
     #[inline(always)]
-    pub fn chunks(&self) -> &[LightChunk] {
+    pub(crate) fn chunks(&self) -> &[LightChunk] {
         &self.chunks
     }
 
@@ -125,6 +125,8 @@ impl PackedLights {
     /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of method §4.
     ///
     /// Lights behind the triangle's plane give nothing, whatever the shading normal says (method §7).
+    // For tests and benches only.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl FnMut(usize) -> Option<Lanes>) -> Vec3 {
         with_falloff!(self.falloff, law => self.irradiance_with(surface, law, visibility))
@@ -178,7 +180,7 @@ impl PackedLights {
 
     /// Tells `seen` of every chunk as seen from the point `x`.
     #[inline(always)]
-    pub fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
+    pub(crate) fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
         with_falloff!(self.falloff, law => self.incident_with(x, law, incident));
     }
 

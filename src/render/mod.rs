@@ -1,8 +1,8 @@
 //! Rendering as a wavefront (method §9): trace → need → evaluate → shade → film, for one block of tiles after the other.
 //!
 //! [`Session`] does it all for one scene. Whoever wants the stages for themselves calls
-//! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate), an
-//! [integrator](integrators)'s `shade`, and [`resolve`].
+//! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate),
+//! [`shade_tile`] with an [integrator](integrators), and [`resolve`].
 
 mod error;
 mod film;

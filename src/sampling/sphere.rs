@@ -45,11 +45,6 @@ impl SphereStrata {
         self.zone.len() as u32
     }
 
-    /// Whether there are none; never.
-    pub fn is_empty(&self) -> bool {
-        self.zone.is_empty()
-    }
-
     /// The direction at (u, v) of [0, 1)² within part `cell`; uniform there for uniform (u, v).
     #[inline(always)]
     pub fn direction(&self, cell: u32, u: f32, v: f32) -> Vec3 {

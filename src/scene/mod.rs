@@ -19,7 +19,7 @@ pub use alpha_mask::AlphaMask;
 pub use camera::{Camera, CameraError};
 pub use camera_rays::CameraRays;
 pub use light::{Falloff, Light, LightKind};
-pub use masked_mesh::{AlphaMasks, MaskedMesh};
+pub(crate) use masked_mesh::{AlphaMasks, MaskedMesh};
 pub use material::Material;
 pub use mesh::{Instance, Positions, TriangleMaterials, TriangleMesh};
 pub use ray::{Hit, Ray};

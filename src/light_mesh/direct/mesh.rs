@@ -29,6 +29,7 @@ pub struct DirectMesh {
 /// How surface points interpolate a direct mesh.
 pub struct DirectInterpolation {
     /// The kernel.
+    #[doc(hidden)]
     pub neighbourhoods: Neighbourhoods,
     /// Which points of D_y count.
     pub leaks: Leaks,
@@ -49,7 +50,7 @@ pub struct DirectEvaluation {
 
 impl DirectEvaluation {
     /// Adds another evaluation.
-    pub fn add(&mut self, other: Self) {
+    pub(crate) fn add(&mut self, other: Self) {
         self.evaluated += other.evaluated;
         self.shadow += other.shadow;
         self.inside += other.inside;
@@ -111,12 +112,14 @@ impl DirectMesh {
     }
 
     /// Points, and what is known of them.
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn store(&self) -> &PointStore {
         &self.store
     }
 
     /// Forgets what depends on the lights' intensities. Visibility stays.
-    pub fn forget_intensities(&mut self) {
+    pub(crate) fn forget_intensities(&mut self) {
         self.field.forget_derived();
     }
 
@@ -132,7 +135,7 @@ pub struct DirectView<'a> {
     /// Finds the points of D_y.
     pub lookup: Lookup<'a>,
     /// Makes direct illumination of them.
-    pub estimator: FieldEstimator<'a>,
+    pub(crate) estimator: FieldEstimator<'a>,
 }
 
 impl DirectView<'_> {
@@ -231,7 +234,7 @@ impl DirectView<'_> {
     /// Classifies the lights by D_y: per chunk those that all of its points see (`seen`), and those on which they disagree
     /// (`uncertain`).
     #[inline(always)]
-    pub fn classify<A: Accel>(
+    pub(crate) fn classify<A: Accel>(
         &self,
         accel: &A,
         surface: &SurfacePoint,

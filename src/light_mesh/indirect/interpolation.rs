@@ -7,9 +7,9 @@ use crate::settings::IndirectShading;
 /// How surface points interpolate an indirect mesh.
 pub struct IndirectInterpolation {
     /// The kernel.
-    pub neighbourhoods: Neighbourhoods,
+    pub(crate) neighbourhoods: Neighbourhoods,
     /// The settings that it follows from.
-    pub shading: IndirectShading,
+    pub(crate) shading: IndirectShading,
 }
 
 /// How surfaces send on the direct light that indirect mesh points receive.

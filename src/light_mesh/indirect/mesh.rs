@@ -1,7 +1,5 @@
 //! The indirect light mesh: its points, and the light that is known at them.
 
-use glam::Vec3;
-
 use super::interpolation::IndirectInterpolation;
 use super::octahedral::ENTRIES;
 use crate::Bounds;
@@ -53,7 +51,7 @@ impl IndirectMesh {
     }
 
     /// Points, and what is known of them.
-    pub fn store(&self) -> &PointStore {
+    pub(crate) fn store(&self) -> &PointStore {
         &self.store
     }
 
@@ -67,10 +65,5 @@ impl IndirectMesh {
     pub(super) fn value(&self, slot: u32) -> &[[f32; 3]] {
         let entries = self.entries();
         &self.values[slot as usize * entries..][..entries]
-    }
-
-    /// Mean over all directions of the light at the point in a slot, RGB, whatever a surface's normal.
-    pub fn mean(&self, slot: u32) -> Vec3 {
-        self.value(slot).first().map_or(Vec3::ZERO, |&mean| mean.into())
     }
 }

@@ -11,8 +11,8 @@ mod neighbours;
 mod periodic;
 mod point_set;
 
-pub use cells::{CellCache, PointPacket, Surroundings};
-pub use kernel::Kernel;
+pub(crate) use cells::{CellCache, PointPacket, Surroundings};
+pub(crate) use kernel::Kernel;
 pub use neighbourhoods::Neighbourhoods;
 pub use neighbours::Neighbours;
 pub use point_set::{MeshError, PointSet};

@@ -41,14 +41,14 @@ pub struct Neighbourhoods {
 
 impl Neighbourhoods {
     /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
-    pub const AUTO_SPACINGS: f32 = 120.0;
+    pub(crate) const AUTO_SPACINGS: f32 = 120.0;
 
     /// Adds the layers that the settings ask for to `points`. An automatic spacing is the scene's diagonal over
     /// `auto_spacings`.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub fn new(
+    pub(crate) fn new(
         points: &mut PointSet,
         settings: &PointSettings,
         kernel: &KernelSettings,
@@ -80,7 +80,7 @@ impl Neighbourhoods {
     }
 
     /// About how many points the neighbourhoods of surface points can reach.
-    pub fn count(&self, points: &PointSet) -> u64 {
+    pub(crate) fn count(&self, points: &PointSet) -> u64 {
         let bounds = points.bounds();
         let count = |zone: &Zone| {
             let of = zone.bounds.unwrap_or(bounds);
@@ -102,12 +102,12 @@ impl Neighbourhoods {
 
     /// R at a position.
     #[inline(always)]
-    pub fn radius_at(&self, y: Vec3) -> f32 {
+    pub(crate) fn radius_at(&self, y: Vec3) -> f32 {
         self.zones[self.zone_number_at(y)].radius
     }
 
     /// The kernel of a surface point, unless the neighbourhood is the nearest point.
-    pub fn kernel(&self, surface: &SurfacePoint) -> Kernel {
+    pub(crate) fn kernel(&self, surface: &SurfacePoint) -> Kernel {
         self.kernel_in(&self.zones[self.zone_number_at(surface.position)], surface)
     }
 
@@ -137,7 +137,7 @@ impl Neighbourhoods {
     /// The kernel of a surface point, and all points that may lie in it, from the cell cache; `None` where that would be no
     /// help. `slot` gives the slots of points; `forget` receives the packets that the cache drops.
     #[inline(always)]
-    pub fn around<'a>(
+    pub(crate) fn around<'a>(
         &self,
         points: &PointSet,
         surface: &SurfacePoint,

@@ -59,12 +59,12 @@ pub struct PointSet {
 
 impl PointSet {
     /// Without layers, for a scene of the given bounds.
-    pub fn new(bounds: Bounds) -> Self {
+    pub(crate) fn new(bounds: Bounds) -> Self {
         Self { bounds, layers: Vec::new() }
     }
 
     /// Bounds of the scene.
-    pub fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> Bounds {
         self.bounds
     }
 
@@ -105,7 +105,7 @@ impl PointSet {
     }
 
     /// Points of other layers at exactly the position of a point.
-    pub fn twins(&self, id: u64) -> impl Iterator<Item = u64> + '_ {
+    pub(crate) fn twins(&self, id: u64) -> impl Iterator<Item = u64> + '_ {
         let own = (id >> LAYER_SHIFT) as usize;
         let position = (self.layers.len() > 1).then(|| self.position(id));
         let others = self.layers.iter().enumerate().filter(move |(number, _)| *number != own);
