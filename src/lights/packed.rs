@@ -178,7 +178,7 @@ impl PackedLights {
         horizontal_sums([r, g, b, &[0.0; LANES]]).truncate()
     }
 
-    /// Tells `seen` of every chunk as seen from the point `x`.
+    /// Passes every chunk to `incident`, as seen from the point `x`.
     #[inline(always)]
     pub(crate) fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
         with_falloff!(self.falloff, law => self.incident_with(x, law, incident));

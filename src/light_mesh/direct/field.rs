@@ -58,15 +58,15 @@ impl DirectField {
         }
         let first = self.bits.len();
         self.bits.resize(first + points.len() * chunks, 0);
-        // Groups of 16 points are the packets; a task gets so many that tasks are neither many nor long: without a limit the
+        // Sixteen points make a packet; a task gets so many that tasks are neither many nor long: without a limit the
         // last one, which nobody can help with, is long (see `TILES_PER_TASK` in the renderer).
-        const GROUP: usize = LANES;
+        const PACKET: usize = LANES;
         const RAYS_PER_TASK: usize = 1 << 10;
-        let groups_per_task = (RAYS_PER_TASK / (GROUP * lights.len())).max(1);
+        let packets_per_task = (RAYS_PER_TASK / (PACKET * lights.len())).max(1);
         self.bits[first..]
-            .par_chunks_mut(GROUP * chunks)
-            .zip(points.par_chunks(GROUP))
-            .with_max_len(groups_per_task)
+            .par_chunks_mut(PACKET * chunks)
+            .zip(points.par_chunks(PACKET))
+            .with_max_len(packets_per_task)
             .for_each(|(bits, points)| trace_visibility(accel, lights, points, bits));
         (points.len() * lights.len()) as u64
     }

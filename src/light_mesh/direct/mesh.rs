@@ -63,7 +63,7 @@ impl DirectMesh {
         Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
     }
 
-    /// What it takes to interpolate the mesh by these settings; the points that they ask for become points of the mesh.
+    /// What it takes to interpolate the mesh by these settings; the layers of points that they name are added to the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].
@@ -154,8 +154,8 @@ impl DirectView<'_> {
 
     /// [`DirectView::illumination`] of a surface point that is one of several in a row of the same normal.
     ///
-    /// They differ in the weights of the mesh points only, so that `directional` needs what each mesh point gives to
-    /// that normal just once.
+    /// Surface points of a row differ in the weights of the mesh points only, so that `directional` computes the irradiance
+    /// that each mesh point has for their normal just once.
     #[inline(always)]
     pub fn illumination_in_row<A: Accel>(
         &self,
@@ -211,7 +211,7 @@ impl DirectView<'_> {
         self.lookup.leaks == Leaks::Invalidate && self.lookup.store.is_inside(slot)
     }
 
-    /// Notes the irradiance of a normal at the points of a packet.
+    /// Stores the irradiance of a normal at the points of a packet, for all surface points of that normal.
     #[inline(always)]
     fn light_packet(&self, packet: &mut PointPacket, normal: Vec3) {
         let monomials = spherical_harmonics::monomials(normal);

@@ -1,5 +1,5 @@
-//! Where mesh points lie: positions and their ids, the kernel around a surface point, and the points within it. Nothing here
-//! knows what is kept at the points.
+//! Where mesh points lie: positions and their ids, the kernel around a surface point, and the points within it. No file of this folder
+//! knows which values are kept at the points.
 
 mod cells;
 mod ids;

@@ -20,7 +20,7 @@ struct Zone {
     /// The kernel of this radius, around any point.
     kernel: Kernel,
     /// Side of the cells whose surface points share a search for mesh points, and 1 over it; `None` where D_y is no
-    /// ball, or where coordinates are so large that they hardly tell cells apart.
+    /// ball, or where coordinates are so large that cells are hardly distinct.
     cells: Option<(f32, f32)>,
 }
 
@@ -28,7 +28,7 @@ struct Zone {
 /// that most of them don't need.
 const CELL_SIDE: f32 = 0.3;
 
-/// Cells are told apart up to this far from the origin, in units of their side.
+/// Cells are distinct up to this far from the origin, in units of their side.
 const FARTHEST_CELL: f32 = (1 << 20) as f32;
 
 /// Which layer of points and which kernel a surface point takes.
@@ -43,7 +43,7 @@ impl Neighbourhoods {
     /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
     pub(crate) const AUTO_SPACINGS: f32 = 120.0;
 
-    /// Adds the layers that the settings ask for to `points`. An automatic spacing is the scene's diagonal over
+    /// Adds the layers that the settings name to `points`. An automatic spacing is the scene's diagonal over
     /// `auto_spacings`.
     ///
     /// # Errors

@@ -112,7 +112,7 @@ impl Neighbours {
     /// Changes the weights so that their mean of a field that is linear in the height over the surface is the field at the
     /// surface, not at the points' centroid in front of it; `height` gives the points' heights by slot.
     ///
-    /// Where all points are about as high, which tells nothing of the slope, the weights stay as they are.
+    /// Where all points are about as high, from which no slope follows, the weights stay as they are.
     pub(crate) fn extrapolate_to_surface(&mut self, height: impl Fn(u32) -> f32) {
         /// Spread of the heights, over their mean squared, from which on the slope counts for more than half.
         const LEAST_SPREAD: f32 = 0.02;

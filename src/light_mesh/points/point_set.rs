@@ -14,10 +14,10 @@ use crate::settings::PointLayout;
 /// Why a light mesh can't be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// Spacing below what coordinates or point numbers can express.
+    /// Spacing below what coordinates or ids of points can express.
     #[error("spacing {0} of the light mesh is too fine for a scene of this size")]
     TooFine(Vec3),
-    /// More different spacings than point numbers can tell apart.
+    /// More different spacings than the ids of points can distinguish.
     #[error("a light mesh has points of at most {MOST_LAYERS} different spacings")]
     TooManySpacings,
 }
@@ -51,7 +51,7 @@ struct Layer {
 
 /// Mesh points of one or several layouts and spacings, their *layers*, over a scene.
 ///
-/// Layers are added as they are asked for and never change, so that ids stay valid whatever settings follow.
+/// Layers are added as settings need them and never change, so that ids stay valid whatever settings follow.
 pub struct PointSet {
     bounds: Bounds,
     layers: Vec<Layer>,
