@@ -24,7 +24,7 @@ pub struct Lookup<'a> {
 pub struct LookupScratch {
     /// D_y.
     pub(super) points: Neighbours,
-    /// What surface points that lie close together share; `None` where they come from anywhere.
+    /// Searches that surface points close together share; `None` where surface points come from anywhere.
     cells: Option<CellCache>,
     /// Occlusion rays traced from surface points to mesh points.
     pub rays: u64,

@@ -13,7 +13,7 @@ use crate::simd::{LANES, Lanes, horizontal_sums};
 pub struct LightChunk {
     /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
     pub position: [Lanes; 3],
-    /// What lights that are no point lights differ in; `None` where all lanes are point lights.
+    /// Kinds of the lights that are no point lights; `None` where all lanes are point lights.
     kinds: Option<Box<KindLanes>>,
     /// E, by channel; 0 in lanes that hold no light.
     pub intensity: [Lanes; 3],

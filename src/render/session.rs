@@ -41,7 +41,7 @@ impl Session {
         Ok(Self::of_valid(scene, backend))
     }
 
-    /// The same with an acceleration structure that was built from the scene's geometry before.
+    /// A session with an acceleration structure that was built from the scene's geometry before.
     ///
     /// # Errors
     /// [`SessionError::Scene`].

@@ -63,7 +63,7 @@ impl DirectMesh {
         Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
     }
 
-    /// What it takes to interpolate the mesh by these settings; the layers of points that they name are added to the mesh.
+    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].

@@ -28,7 +28,7 @@ impl IndirectMesh {
         }
     }
 
-    /// What it takes to interpolate the mesh by these settings; the layers of points that they name are added to the mesh.
+    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].

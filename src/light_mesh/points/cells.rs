@@ -24,7 +24,7 @@ pub struct PointPacket {
     pub ids: [u64; LANES],
     /// Their slots, as far as they are known.
     pub slots: [u32; LANES],
-    /// Those that lay in the kernel of some surface point.
+    /// Lanes whose points lay in the kernel of some surface point.
     pub needed: u16,
     /// Irradiance of the points for one normal, [`Surroundings::normal`], by channel.
     pub lit: [Lanes; 3],
