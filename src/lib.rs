@@ -42,8 +42,9 @@
 //! 5. **film**: the pixels, which a sink receives tile by tile.
 //!
 //! Each stage is a public function that takes references and returns a value. A [`Session`](render::Session) runs them in turn and
-//! keeps the mesh points from one image to the next. What a mesh point knows depends on the triangles and on where the lights stand, on nothing else: a second camera,
-//! another radius, estimator or leak rule, brighter or dimmer lights cost rays only for points that were never needed before.
+//! keeps the mesh points from one image to the next. What is known of a mesh point depends on the triangles and on where the lights
+//! stand, on nothing else: a second camera, another radius, estimator or leak rule, brighter or dimmer lights cost rays only for points
+//! that were never needed before.
 //!
 //! The same scene and settings give the same image, to the last bit, whatever the number of threads and the size of blocks.
 //!
@@ -78,9 +79,13 @@ pub mod image;
 pub mod light_mesh;
 pub mod lights;
 pub mod render;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod sampling;
 pub mod scene;
 pub mod settings;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod simd;
 mod world;
 

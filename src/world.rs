@@ -1,4 +1,4 @@
-//! What rays meet and what shines, together.
+//! A scene together with its acceleration structure and its lights.
 
 use crate::accel::Accel;
 use crate::lights::{EmissiveTriangles, PackedLights};
@@ -16,7 +16,7 @@ pub struct World<'a, A> {
     pub emissive: &'a EmissiveTriangles,
 }
 
-// Derived, these would ask for a backend that can be copied.
+// Derived implementations would require a backend that can be copied.
 impl<A> Copy for World<'_, A> {}
 impl<A> Clone for World<'_, A> {
     fn clone(&self) -> Self {

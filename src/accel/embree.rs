@@ -77,6 +77,8 @@ impl EmbreeAccel {
     ///
     /// As for [`EmbreeAccel::build`].
     #[doc(hidden)]
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn build_with(library: &Library, scene: &Scene) -> Result<Self, EmbreeError> {
         let threads = format!("threads={}", rayon::current_num_threads());
         let device = Device::new(library, &threads).map_err(EmbreeError::Library)?;

@@ -266,7 +266,8 @@ fn copy_block(
         let location = line.location;
         let targets = selection[location.channel];
         let Ok(y) = usize::try_from(location.position.y() as i64 + top) else { continue };
-        let Some(row) = image.pixels.chunks_exact_mut(width).nth(y).filter(|_| targets != [false; 3]) else {
+        let Some(row) = image.pixels_mut().chunks_exact_mut(width).nth(y).filter(|_| targets != [false; 3])
+        else {
             continue;
         };
         let mut put = |i: usize, value: f32| {

@@ -15,7 +15,7 @@ pub(crate) const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a,
 /// Deflate's largest ratio of output to input, rounded up; a file that claims more pixels than that is damaged.
 const MAX_DEFLATE_RATIO: u64 = 1040;
 
-/// Encodes `image` as 8-bit sRGB after [`tone_map`](super::tone::tone_map) with `exposure` in stops.
+/// Encodes `image` as 8-bit sRGB, tone-mapped with `exposure` in stops.
 ///
 /// `metadata` becomes text chunks. Pixels that are not a number come out black.
 ///

@@ -6,13 +6,13 @@
 use crate::color::srgb_from_linear;
 
 /// Tone-maps one pixel: sRGB values in [0, 1] of linear RGB scaled by 2^`exposure` (in stops).
-pub fn tone_map(pixel: [f32; 3], exposure: f32) -> [f32; 3] {
+pub(crate) fn tone_map(pixel: [f32; 3], exposure: f32) -> [f32; 3] {
     let scale = exposure.exp2();
     pixel.map(|value| srgb_from_linear(value * scale))
 }
 
 /// Tone-maps one pixel to 8 bits per channel, rounded to nearest.
-pub fn tone_map_8_bit(pixel: [f32; 3], exposure: f32) -> [u8; 3] {
+pub(crate) fn tone_map_8_bit(pixel: [f32; 3], exposure: f32) -> [u8; 3] {
     tone_map(pixel, exposure).map(|value| (value * 255.0).round() as u8)
 }
 

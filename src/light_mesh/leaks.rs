@@ -18,7 +18,7 @@ pub const PROBES: usize = 14;
 const INSIDE_SHARE: f32 = 0.7;
 
 fn probe(index: usize) -> Vec3 {
-    let cube = match index {
+    let corner = match index {
         0..6 => Vec3::AXES[index / 2] * if index.is_multiple_of(2) { 1.0 } else { -1.0 },
         _ => {
             let sign = |bit: usize| if index >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -26,7 +26,7 @@ fn probe(index: usize) -> Vec3 {
         }
     };
     // A fixed rotation by an odd angle about an odd axis.
-    glam::Quat::from_axis_angle(Vec3::new(0.36, 0.48, 0.8), 0.83) * cube.normalize()
+    glam::Quat::from_axis_angle(Vec3::new(0.36, 0.48, 0.8), 0.83) * corner.normalize()
 }
 
 /// Whether a mesh point lies inside of geometry, judged by the share of back faces that it sees.

@@ -2,7 +2,8 @@
 
 use super::leaks::{LeakGuard, LeakedPoints};
 use super::points::{CellCache, Kernel, Neighbourhoods, Neighbours, PointPacket, Surroundings};
-use super::store::{NeededPoints, PointMask, PointStore, UNKNOWN};
+use super::slot::UNKNOWN;
+use super::store::{NeededPoints, PointMask, PointStore};
 use crate::accel::Accel;
 use crate::scene::SurfacePoint;
 use crate::settings::Leaks;
@@ -11,11 +12,11 @@ use crate::settings::Leaks;
 #[derive(Clone, Copy)]
 pub struct Lookup<'a> {
     /// The points.
-    pub store: &'a PointStore,
+    pub(crate) store: &'a PointStore,
     /// The kernel, in every part of space.
-    pub neighbourhoods: &'a Neighbourhoods,
+    pub(crate) neighbourhoods: &'a Neighbourhoods,
     /// Which points of D_y count.
-    pub leaks: Leaks,
+    pub(crate) leaks: Leaks,
 }
 
 /// Working memory and counters of one thread while it looks up mesh points.
@@ -23,7 +24,7 @@ pub struct Lookup<'a> {
 pub struct LookupScratch {
     /// D_y.
     pub(super) points: Neighbours,
-    /// What surface points that lie close together share; `None` where they come from anywhere.
+    /// Searches that surface points close together share; `None` where surface points come from anywhere.
     cells: Option<CellCache>,
     /// Occlusion rays traced from surface points to mesh points.
     pub rays: u64,
@@ -69,7 +70,7 @@ impl Lookup<'_> {
     /// D_y with slots for one of many surface points that lie close together: `cells` keeps what is the same for all. It must
     /// not outlive the next evaluation of mesh points. Returns whether D_y was empty and the nearest point took its place.
     #[inline(always)]
-    pub fn known_within(&self, surface: &SurfacePoint, cells: &mut CellCache, out: &mut Neighbours) -> bool {
+    fn known_within(&self, surface: &SurfacePoint, cells: &mut CellCache, out: &mut Neighbours) -> bool {
         out.clear();
         if let Some((kernel, around)) = self.around(surface, cells) {
             for packet in around.packets {
@@ -82,7 +83,7 @@ impl Lookup<'_> {
 
     /// D_y with slots for any surface point; returns whether it was empty and the nearest point took its place.
     #[inline(never)]
-    pub fn known(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
+    fn known(&self, surface: &SurfacePoint, out: &mut Neighbours) -> bool {
         let fallback = self.neighbourhoods.find(&self.store.points, surface, out);
         out.find_slots(|id| {
             let slot = self.store.slot(id);

@@ -15,15 +15,24 @@
 //!
 //! | room | what |
 //! |---|---|
-//! | [`points`] | positions and ids, kernels, finding the points of D_y |
-//! | [`store`] | which points are known, and in which slot |
-//! | `leaks`, [`lookup`] | the known points of D_y that count for a surface point |
+//! | `points` | positions and ids, kernels, finding the points of D_y |
+//! | `leaks` | which points of D_y count for a surface point |
+//! | `store` | which points are known, and in which slot |
+//! | [`lookup`] | the known points of D_y that count |
 //! | [`direct`] | visibility of lights at mesh points, and the estimators |
 //! | [`indirect`] | gathering, bounces, irradiance by normal |
 
 pub mod direct;
 pub mod indirect;
-pub mod leaks;
+pub(crate) mod leaks;
 pub mod lookup;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod points;
+mod slot;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod store;
+
+pub use points::MeshError;
+pub use store::PointMask;

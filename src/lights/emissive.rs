@@ -1,4 +1,4 @@
-//! Surfaces that shine: points on them, chosen by their power, to which mesh points look for light.
+//! Emissive triangles: points on them, chosen by their power, to which mesh points look for light.
 //!
 //! A lamp that covers a hundredth of the sphere is hit by a hundredth of the directions of eq. (4): its light would come
 //! out as noise. So mesh points also send occlusion rays to points on the lamps. Each kind of ray counts with the share
@@ -66,14 +66,14 @@ impl EmissiveTriangles {
         emissive
     }
 
-    /// Whether nothing shines.
+    /// Whether no triangle emits.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
     /// Pdf per solid angle at `x` with which one choice of a point finds `surface`, the surface of `hit`.
     #[inline(always)]
-    pub fn pdf(&self, scene: &Scene, x: Vec3, hit: &Hit, surface: &SurfacePoint) -> f32 {
+    pub(crate) fn pdf(&self, scene: &Scene, x: Vec3, hit: &Hit, surface: &SurfacePoint) -> f32 {
         let Some(&total) = self.cumulative.last() else { return 0.0 };
         let way = surface.position - x;
         let distance_squared = way.length_squared();
@@ -85,9 +85,16 @@ impl EmissiveTriangles {
     }
 
     /// Choice `k` of `count` for the mesh point at `x`, given three random numbers of [0, 1) that belong to `x`; `None`
-    /// where it shows a side that doesn't shine.
+    /// where it shows a side that doesn't emit.
     #[inline(always)]
-    pub fn sample(&self, scene: &Scene, x: Vec3, k: u32, count: u32, noise: Vec3) -> Option<EmissiveSample> {
+    pub(crate) fn sample(
+        &self,
+        scene: &Scene,
+        x: Vec3,
+        k: u32,
+        count: u32,
+        noise: Vec3,
+    ) -> Option<EmissiveSample> {
         let total = *self.cumulative.last()?;
         let target = f64::from(k as f32 + noise.x) / f64::from(count) * total;
         let index = self.cumulative.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);
@@ -163,7 +170,7 @@ mod tests {
 
     /// The back of a one-sided lamp is dark, and so is a scene without emission.
     #[test]
-    fn what_does_not_shine_is_not_chosen() {
+    fn what_does_not_emit_is_not_chosen() {
         let mut scene = lamp();
         let emissive = EmissiveTriangles::of_scene(&scene);
         let above = Vec3::new(0.0, 3.0, 0.0);

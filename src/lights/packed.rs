@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::VisibilityBits;
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
 use super::kinds::KindLanes;
+use super::visibility::VisibilityBits;
 use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
 
@@ -13,7 +13,7 @@ use crate::simd::{LANES, Lanes, horizontal_sums};
 pub struct LightChunk {
     /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
     pub position: [Lanes; 3],
-    /// What lights that are no point lights differ in; `None` where all lanes are point lights.
+    /// Kinds of the lights that are no point lights; `None` where all lanes are point lights.
     kinds: Option<Box<KindLanes>>,
     /// E, by channel; 0 in lanes that hold no light.
     pub intensity: [Lanes; 3],
@@ -88,7 +88,7 @@ impl PackedLights {
 
     /// The chunks.
     #[inline(always)]
-    pub fn chunks(&self) -> &[LightChunk] {
+    pub(crate) fn chunks(&self) -> &[LightChunk] {
         &self.chunks
     }
 
@@ -125,6 +125,8 @@ impl PackedLights {
     /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of method §4.
     ///
     /// Lights behind the triangle's plane give nothing, whatever the shading normal says (method §7).
+    // For tests and benches only.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl FnMut(usize) -> Option<Lanes>) -> Vec3 {
         with_falloff!(self.falloff, law => self.irradiance_with(surface, law, visibility))
@@ -176,9 +178,9 @@ impl PackedLights {
         horizontal_sums([r, g, b, &[0.0; LANES]]).truncate()
     }
 
-    /// Tells `seen` of every chunk as seen from the point `x`.
+    /// Passes every chunk to `incident`, as seen from the point `x`.
     #[inline(always)]
-    pub fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
+    pub(crate) fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {
         with_falloff!(self.falloff, law => self.incident_with(x, law, incident));
     }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::RenderError;
+use super::error::RenderError;
 use super::film::{TileSink, resolve, resolve_block};
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};

@@ -1,9 +1,10 @@
 //! Rendering as a wavefront (method §9): trace → need → evaluate → shade → film, for one block of tiles after the other.
 //!
 //! [`Session`] does it all for one scene. Whoever wants the stages for themselves calls
-//! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate), an
-//! [integrator](integrators)'s `shade`, and [`resolve`].
+//! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate),
+//! [`shade_tile`] with an [integrator](integrators), and [`resolve`].
 
+mod error;
 mod film;
 mod frame;
 pub mod integrators;
@@ -15,11 +16,12 @@ mod surface_group;
 mod tiles;
 mod trace;
 
+pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
-pub use session::{RenderError, Session, SessionError, render};
+pub use session::{Session, render};
 pub use stats::{MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds};
 pub use tiles::Tile;
 pub use trace::{PathVertex, TilePaths, trace_paths};

@@ -2,20 +2,20 @@
 
 use glam::Vec3;
 
+use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::frame::{Frame, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
 use super::meshes::LightMeshes;
 use super::need::needed_points;
 use super::stats::{RenderStats, timed};
-use crate::accel::{Accel, Backend, BackendChoice, BackendError, with_accel};
-use crate::image::{Image, ImageError};
+use crate::accel::{Accel, Backend, BackendChoice, with_accel};
+use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectField};
-use crate::light_mesh::points::MeshError;
 use crate::light_mesh::store::PointMask;
 use crate::lights::{EmissiveTriangles, PackedLights};
-use crate::scene::{Camera, CameraError, Scene, SceneError};
-use crate::settings::{Integrator, Settings, SettingsError};
+use crate::scene::{Camera, Scene, SceneError};
+use crate::settings::{Integrator, Settings};
 use crate::world::World;
 
 /// A scene with its acceleration structure, lights and light meshes.
@@ -30,37 +30,6 @@ pub struct Session {
     meshes: LightMeshes,
 }
 
-/// Why a scene can't be rendered.
-#[derive(Debug, thiserror::Error)]
-pub enum SessionError {
-    /// The scene contradicts itself.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// There is no acceleration structure.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
-}
-
-/// Why there is no image.
-#[derive(Debug, thiserror::Error)]
-pub enum RenderError {
-    /// A camera that sees nothing.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// A setting out of its range.
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    /// The light meshes can't be set up.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// The image can't be held.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// A [`StopToken`] stopped the render.
-    #[error("the render was stopped")]
-    Stopped,
-}
-
 impl Session {
     /// Checks a scene and builds its acceleration structure.
     ///
@@ -72,7 +41,7 @@ impl Session {
         Ok(Self::of_valid(scene, backend))
     }
 
-    /// The same with an acceleration structure that was built from the scene's geometry before.
+    /// A session with an acceleration structure that was built from the scene's geometry before.
     ///
     /// # Errors
     /// [`SessionError::Scene`].

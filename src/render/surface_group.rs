@@ -56,7 +56,7 @@ impl SurfaceGroup {
         facing & self.used
     }
 
-    /// Those of the points that see the light aimed at: one ray each.
+    /// The points, of those given, that see the light aimed at: one ray each.
     #[inline(always)]
     pub fn seeing<A: Accel>(&mut self, accel: &A, points: LaneMask) -> LaneMask {
         self.packet.tfar = [1.0; LANES];

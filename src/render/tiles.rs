@@ -13,7 +13,7 @@ pub const TILES_PER_TASK: usize = 1;
 /// Edge of the squares of pixels whose rays form one packet of 16.
 const SQUARE: u32 = 4;
 
-/// A rectangle of at most [`TILE`]×[`TILE`] pixels.
+/// A rectangle of at most 32 × 32 pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Left column.
@@ -33,20 +33,20 @@ impl Tile {
     }
 
     /// Number of the square of 4×4 pixels that a pixel of the tile lies in, row by row.
-    pub fn square_of(&self, pixel: u32) -> u8 {
+    pub(super) fn square_of(&self, pixel: u32) -> u8 {
         let (x, y) = (pixel % self.width, pixel / self.width);
         (y / SQUARE * (TILE / SQUARE) + x / SQUARE) as u8
     }
 
     /// Some squares of a tile, one bit each, together with all that touch them.
-    pub fn around(squares: u64) -> u64 {
+    pub(super) fn around(squares: u64) -> u64 {
         const LEFT: u64 = 0x0101_0101_0101_0101;
         let row = squares | (squares & !(LEFT << 7)) << 1 | (squares & !LEFT) >> 1;
         row | row << 8 | row >> 8
     }
 
     /// Squares of up to 4×4 pixels, row by row: for each pixel its column, row, and index within the tile.
-    pub fn squares(&self) -> impl Iterator<Item = impl Iterator<Item = (u32, u32, u32)> + '_> + '_ {
+    pub(super) fn squares(&self) -> impl Iterator<Item = impl Iterator<Item = (u32, u32, u32)> + '_> + '_ {
         let steps = |length: u32| (0..length).step_by(SQUARE as usize);
         steps(self.height).flat_map(move |top| {
             steps(self.width).map(move |left| {

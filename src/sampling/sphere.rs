@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::mix;
+use super::hash::mix;
 
 /// A partition of the sphere into `N` parts of equal area: zones of equal-area cells.
 ///
@@ -43,11 +43,6 @@ impl SphereStrata {
     /// Number of parts.
     pub fn len(&self) -> u32 {
         self.zone.len() as u32
-    }
-
-    /// Whether there are none; never.
-    pub fn is_empty(&self) -> bool {
-        self.zone.is_empty()
     }
 
     /// The direction at (u, v) of [0, 1)² within part `cell`; uniform there for uniform (u, v).

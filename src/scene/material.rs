@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{AlphaMask, TextureMap};
+use super::alpha_mask::AlphaMask;
+use super::texture::TextureMap;
 
 /// Material of a surface: the paper's k_d, k_s and Emiss, and its sides (docs/method.md §7).
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,9 @@
 
 use glam::{Mat3A, Vec2, Vec3, Vec3A};
 
-use super::{Hit, Scene, TextureMap};
+use super::ray::Hit;
+use super::scene::Scene;
+use super::texture::TextureMap;
 
 /// A visible surface point y (docs/method.md §1).
 ///

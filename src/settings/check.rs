@@ -1,6 +1,8 @@
 //! What settings made in memory must fulfil; those of scene files and flags are checked where they are read.
 
-use super::{PointLayout, PointSettings, Radius, Settings, Spacing};
+use super::mesh::{PointLayout, PointSettings, Spacing};
+use super::settings::Settings;
+use super::shading::Radius;
 use crate::image::MAX_PIXELS;
 
 /// A setting out of its range.

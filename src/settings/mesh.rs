@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{KernelSettings, Radius, named_enum};
+use super::names::named_enum;
+use super::shading::{KernelSettings, Radius};
 use crate::Bounds;
 
 /// The light meshes.
@@ -52,7 +53,7 @@ pub struct IndirectSettings {
 }
 
 impl IndirectSettings {
-    /// Indirect light varies slowly: unless told otherwise, spacing and radius are this many times the direct mesh's.
+    /// Indirect light varies slowly: unless settings say otherwise, spacing and radius are this many times the direct mesh's.
     pub const COARSENESS: f32 = 2.0;
 
     /// Points for indirect light, given those for direct light.
@@ -107,9 +108,9 @@ named_enum! {
 pub enum PointLayout {
     /// Regular grid: the paper's.
     Regular,
-    /// Corners and centres of cubes whose edge is the spacing.
+    /// Corners and centres of cells whose edge is the spacing.
     BodyCentred,
-    /// One point anywhere in each cube of a regular grid.
+    /// One point anywhere in each cell of a regular grid.
     Jittered {
         /// Seed of the jitter.
         seed: u64,
@@ -128,9 +129,9 @@ named_enum! {
     pub enum LayoutName {
         /// Regular grid: the paper's
         Regular = "regular",
-        /// Corners and centres of cubes whose edge is the spacing
+        /// Corners and centres of cells whose edge is the spacing
         BodyCentred = "body-centred",
-        /// One point anywhere in each cube of a regular grid
+        /// One point anywhere in each cell of a regular grid
         Jittered = "jittered",
         /// As dense as the regular grid, without its rows
         BlueNoise = "blue-noise",

@@ -1,6 +1,6 @@
 //! Enums whose values have names, the same in scene files, on the command line and in reports.
 
-/// An enum whose values have names; made by [`named_enum`].
+/// An enum whose values have names; which scene files, the command line and reports share.
 pub trait Named: Copy + PartialEq + Sized + 'static {
     /// Every value with its name and what it stands for, in the order in which they are listed.
     const NAMES: &'static [(&'static str, Self, &'static str)];

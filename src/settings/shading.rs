@@ -1,6 +1,6 @@
 //! How surface points are shaded. No change of these makes a known mesh point's visibility unknown.
 
-use super::named_enum;
+use super::names::named_enum;
 
 /// How surface points are shaded.
 #[derive(Clone, Debug, PartialEq)]

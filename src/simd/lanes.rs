@@ -2,7 +2,7 @@
 
 use glam::{Mat4, Vec4};
 
-/// Lights per chunk, and mesh points per group: one AVX-512 register, two of AVX2.
+/// Lights per chunk, and mesh points per packet: one AVX-512 register, two of AVX2.
 pub const LANES: usize = 16;
 
 /// One value per lane.

@@ -7,7 +7,8 @@
 
 mod lanes;
 
-pub use lanes::{LANES, Lanes, horizontal_extremes, horizontal_sum, horizontal_sums};
+pub use lanes::LANES;
+pub(crate) use lanes::{Lanes, horizontal_extremes, horizontal_sum, horizontal_sums};
 
 use pulp::NullaryFnOnce;
 

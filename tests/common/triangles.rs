@@ -94,3 +94,32 @@ pub fn soup(
     let positions = corners.collect();
     mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), materials)
 }
+
+/// Sphere of `rings` × 2`rings` quads, closed at the poles.
+pub fn sphere(rings: u32, radius: f32) -> Arc<TriangleMesh> {
+    let segments = 2 * rings;
+    let mut positions = vec![[0.0, radius, 0.0], [0.0, -radius, 0.0]];
+    for ring in 1..rings {
+        let polar = std::f32::consts::PI * ring as f32 / rings as f32;
+        for segment in 0..segments {
+            let angle = std::f32::consts::TAU * segment as f32 / segments as f32;
+            positions.push([
+                radius * polar.sin() * angle.cos(),
+                radius * polar.cos(),
+                radius * polar.sin() * angle.sin(),
+            ]);
+        }
+    }
+    let at = |ring: u32, segment: u32| 2 + (ring - 1) * segments + segment % segments;
+    let mut triangles = Vec::new();
+    for segment in 0..segments {
+        triangles.push([0, at(1, segment), at(1, segment + 1)]);
+        triangles.push([1, at(rings - 1, segment + 1), at(rings - 1, segment)]);
+        for ring in 1..rings - 1 {
+            let [a, b] = [at(ring, segment), at(ring, segment + 1)];
+            let [c, d] = [at(ring + 1, segment), at(ring + 1, segment + 1)];
+            triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    mesh(positions, triangles, None)
+}

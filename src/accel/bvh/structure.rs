@@ -39,6 +39,8 @@ impl BvhAccel {
     /// # Errors
     /// As for [`build`](Self::build), and [`BvhError::Unsupported`].
     #[doc(hidden)]
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn with_level(scene: &Scene, level: SimdLevel) -> Result<Self, BvhError> {
         let dispatch = Dispatch::new(level).ok_or(BvhError::Unsupported(level))?;
         let (fixed, instances) = build_scene(scene)?;

@@ -12,6 +12,8 @@ impl BvhAccel {
     /// exactly one leaf, children's boxes lie inside their parents', and hold what is below
     /// them. The error names the place; for tests.
     #[doc(hidden)]
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn validate(&self) -> Result<(), String> {
         for blas in self.instances.trees.iter().chain([&self.fixed]) {
             validate_blas(blas)?;
@@ -39,6 +41,8 @@ impl BvhAccel {
 
     /// A digest of all trees, equal for equal trees; for tests of the build's determinism.
     #[doc(hidden)]
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn digest(&self) -> u64 {
         use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
@@ -59,6 +63,8 @@ impl BvhAccel {
     }
 
     /// Number of triangles in the trees; those of an instanced mesh count once; for tests.
+    #[doc(hidden)]
+    // For tests and benches only.
     #[doc(hidden)]
     pub fn triangle_count(&self) -> usize {
         let blocks = self.instances.trees.iter().chain([&self.fixed]).flat_map(|blas| &blas.blocks);

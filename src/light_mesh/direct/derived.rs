@@ -25,7 +25,7 @@ pub enum Basis {
 
 impl Basis {
     /// The basis that an estimator reads.
-    pub fn of(estimator: Estimator) -> Self {
+    pub(crate) fn of(estimator: Estimator) -> Self {
         match estimator {
             Estimator::PerLight => Self::Bits,
             Estimator::Paper | Estimator::Ratio => Self::Light,

@@ -23,25 +23,25 @@ pub struct DirectField {
 impl DirectField {
     /// Visibility of the lights from the point in `slot`, by chunk of [`LANES`] lights.
     #[inline(always)]
-    pub fn bits(&self, slot: u32, chunks: usize) -> &[VisibilityBits] {
+    pub(crate) fn bits(&self, slot: u32, chunks: usize) -> &[VisibilityBits] {
         &self.bits[slot as usize * chunks..][..chunks]
     }
 
     /// DirectLight and the unoccluded DirectLight at the point in `slot`, RGB each.
     #[inline(always)]
-    pub fn light(&self, slot: u32) -> &[f32; 6] {
+    pub(crate) fn light(&self, slot: u32) -> &[f32; 6] {
         self.light.values(slot)
     }
 
     /// Irradiance by normal at the point in `slot`, see [`spherical_harmonics`].
     #[inline(always)]
-    pub fn irradiance(&self, slot: u32) -> &[f32; spherical_harmonics::STRIDE] {
+    pub(crate) fn irradiance(&self, slot: u32) -> &[f32; spherical_harmonics::STRIDE] {
         self.irradiance.values(slot)
     }
 
     /// Amount of light at the point in `slot`, summed over channels and directions, to compare points with; of one basis.
     #[inline(always)]
-    pub fn amount(&self, basis: Basis, slot: u32) -> f32 {
+    pub(crate) fn amount(&self, basis: Basis, slot: u32) -> f32 {
         match basis {
             Basis::Bits => 0.0,
             Basis::Light => self.light.amount(slot),
@@ -58,15 +58,15 @@ impl DirectField {
         }
         let first = self.bits.len();
         self.bits.resize(first + points.len() * chunks, 0);
-        // Groups of 16 points are the packets; a task gets so many that tasks are neither many nor long: without a limit the
+        // Sixteen points make a packet; a task gets so many that tasks are neither many nor long: without a limit the
         // last one, which nobody can help with, is long (see `TILES_PER_TASK` in the renderer).
-        const GROUP: usize = LANES;
+        const PACKET: usize = LANES;
         const RAYS_PER_TASK: usize = 1 << 10;
-        let groups_per_task = (RAYS_PER_TASK / (GROUP * lights.len())).max(1);
+        let packets_per_task = (RAYS_PER_TASK / (PACKET * lights.len())).max(1);
         self.bits[first..]
-            .par_chunks_mut(GROUP * chunks)
-            .zip(points.par_chunks(GROUP))
-            .with_max_len(groups_per_task)
+            .par_chunks_mut(PACKET * chunks)
+            .zip(points.par_chunks(PACKET))
+            .with_max_len(packets_per_task)
             .for_each(|(bits, points)| trace_visibility(accel, lights, points, bits));
         (points.len() * lights.len()) as u64
     }
@@ -81,12 +81,12 @@ impl DirectField {
     }
 
     /// Forgets all derived values, since the lights' intensities have changed.
-    pub fn forget_derived(&mut self) {
+    pub(crate) fn forget_derived(&mut self) {
         (self.light, self.irradiance) = Default::default();
     }
 
     /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
+    pub(crate) fn memory_bytes(&self) -> usize {
         self.bits.capacity() * size_of::<VisibilityBits>()
             + self.light.memory_bytes()
             + self.irradiance.memory_bytes()

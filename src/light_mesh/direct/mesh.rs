@@ -11,7 +11,8 @@ use crate::accel::Accel;
 use crate::light_mesh::leaks::amounts_differ;
 use crate::light_mesh::lookup::{Lookup, LookupScratch};
 use crate::light_mesh::points::{MeshError, Neighbourhoods, PointPacket, PointSet};
-use crate::light_mesh::store::{PointMask, PointStore, UNKNOWN};
+use crate::light_mesh::slot::UNKNOWN;
+use crate::light_mesh::store::{PointMask, PointStore};
 use crate::lights::{PackedLights, VisibilityBits};
 use crate::scene::SurfacePoint;
 use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
@@ -28,6 +29,7 @@ pub struct DirectMesh {
 /// How surface points interpolate a direct mesh.
 pub struct DirectInterpolation {
     /// The kernel.
+    #[doc(hidden)]
     pub neighbourhoods: Neighbourhoods,
     /// Which points of D_y count.
     pub leaks: Leaks,
@@ -48,7 +50,7 @@ pub struct DirectEvaluation {
 
 impl DirectEvaluation {
     /// Adds another evaluation.
-    pub fn add(&mut self, other: Self) {
+    pub(crate) fn add(&mut self, other: Self) {
         self.evaluated += other.evaluated;
         self.shadow += other.shadow;
         self.inside += other.inside;
@@ -61,7 +63,7 @@ impl DirectMesh {
         Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
     }
 
-    /// What it takes to interpolate the mesh by these settings; the points that they ask for become points of the mesh.
+    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh.
     ///
     /// # Errors
     /// See [`MeshError`].
@@ -110,12 +112,14 @@ impl DirectMesh {
     }
 
     /// Points, and what is known of them.
+    // For tests and benches only.
+    #[doc(hidden)]
     pub fn store(&self) -> &PointStore {
         &self.store
     }
 
     /// Forgets what depends on the lights' intensities. Visibility stays.
-    pub fn forget_intensities(&mut self) {
+    pub(crate) fn forget_intensities(&mut self) {
         self.field.forget_derived();
     }
 
@@ -131,7 +135,7 @@ pub struct DirectView<'a> {
     /// Finds the points of D_y.
     pub lookup: Lookup<'a>,
     /// Makes direct illumination of them.
-    pub estimator: FieldEstimator<'a>,
+    pub(crate) estimator: FieldEstimator<'a>,
 }
 
 impl DirectView<'_> {
@@ -150,8 +154,8 @@ impl DirectView<'_> {
 
     /// [`DirectView::illumination`] of a surface point that is one of several in a row of the same normal.
     ///
-    /// They differ in the weights of the mesh points only, so that `directional` needs what each mesh point gives to
-    /// that normal just once.
+    /// Surface points of a row differ in the weights of the mesh points only, so that `directional` computes the irradiance
+    /// that each mesh point has for their normal just once.
     #[inline(always)]
     pub fn illumination_in_row<A: Accel>(
         &self,
@@ -207,7 +211,7 @@ impl DirectView<'_> {
         self.lookup.leaks == Leaks::Invalidate && self.lookup.store.is_inside(slot)
     }
 
-    /// Notes the irradiance of a normal at the points of a packet.
+    /// Stores the irradiance of a normal at the points of a packet, for all surface points of that normal.
     #[inline(always)]
     fn light_packet(&self, packet: &mut PointPacket, normal: Vec3) {
         let monomials = spherical_harmonics::monomials(normal);
@@ -230,7 +234,7 @@ impl DirectView<'_> {
     /// Classifies the lights by D_y: per chunk those that all of its points see (`seen`), and those on which they disagree
     /// (`uncertain`).
     #[inline(always)]
-    pub fn classify<A: Accel>(
+    pub(crate) fn classify<A: Accel>(
         &self,
         accel: &A,
         surface: &SurfacePoint,

@@ -5,9 +5,13 @@ mod derived;
 mod estimators;
 mod field;
 mod mesh;
+// For tests and benches only.
+#[doc(hidden)]
 pub mod spherical_harmonics;
 
-pub use derived::Basis;
-pub use estimators::FieldEstimator;
-pub use field::DirectField;
+pub(crate) use estimators::FieldEstimator;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};
+
+// For tests and benches only.
+#[doc(hidden)]
+pub use {derived::Basis, field::DirectField};

@@ -12,11 +12,11 @@ pub const COEFFICIENTS: usize = 9;
 
 /// Numbers kept per mesh point: coefficient after coefficient, each of three channels and a number without meaning, so
 /// that a coefficient is a vector register.
-pub const STRIDE: usize = 4 * COEFFICIENTS;
+pub(crate) const STRIDE: usize = 4 * COEFFICIENTS;
 
 /// The coefficients of max(0, n·ω), for n the unit vector ω.
 #[inline(always)]
-pub fn cosine_lobe(w: [f32; 3]) -> [f32; COEFFICIENTS] {
+pub(crate) fn cosine_lobe(w: [f32; 3]) -> [f32; COEFFICIENTS] {
     let [x, y, z] = w;
     const SQUARE: f32 = 15.0 / 32.0;
     const CONSTANT: f32 = 3.0 / 32.0;
@@ -35,7 +35,7 @@ pub fn cosine_lobe(w: [f32; 3]) -> [f32; COEFFICIENTS] {
 
 /// What the coefficients are multiplied with to get the irradiance of normal n.
 #[inline(always)]
-pub fn monomials(n: Vec3) -> [f32; COEFFICIENTS] {
+pub(crate) fn monomials(n: Vec3) -> [f32; COEFFICIENTS] {
     let Vec3 { x, y, z } = n;
     [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z]
 }
@@ -54,7 +54,7 @@ pub fn irradiance(coefficients: &[Vec4; COEFFICIENTS], n: Vec3) -> Vec3 {
 /// Light from all directions, summed over the channels: the squares' coefficients of a lobe sum to 3/4 whatever its
 /// direction. Up to that factor it is what scalar values hold.
 #[inline(always)]
-pub fn amount(coefficients: &[f32]) -> f32 {
+pub(crate) fn amount(coefficients: &[f32]) -> f32 {
     coefficients.as_chunks::<4>().0.iter().skip(3).take(3).map(|c| c[0] + c[1] + c[2]).sum()
 }
 

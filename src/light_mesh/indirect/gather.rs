@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::IndirectMesh;
+use super::mesh::IndirectMesh;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::leaks::is_inside_by_share;
 use crate::light_mesh::lookup::Lookup;
@@ -34,10 +34,10 @@ impl IndirectMesh {
             .with_max_len(1)
             .for_each(|(hits, points)| {
                 for (hits, &x) in hits.chunks_mut(directions).zip(points) {
-                    for (group, hits) in hits.chunks_mut(WIDTH).enumerate() {
+                    for (number, hits) in hits.chunks_mut(WIDTH).enumerate() {
                         let mut packet = RayHitPacket::<WIDTH>::empty();
                         for lane in 0..hits.len() {
-                            let direction = self.strata.jittered((group * WIDTH + lane) as u32, x);
+                            let direction = self.strata.jittered((number * WIDTH + lane) as u32, x);
                             packet.set_lane(lane, &Ray::new(x, direction));
                         }
                         let active = ((1u64 << hits.len()) - 1) as u32;

@@ -22,7 +22,7 @@ pub struct Patch {
     pub diffuse: Vec3,
 }
 
-/// Groups of hits.
+/// The patches of many hits.
 #[derive(Default)]
 pub struct Patches {
     /// By number.
@@ -43,7 +43,7 @@ fn key(surface: &SurfacePoint, size: f32) -> u64 {
 }
 
 impl Patches {
-    /// Groups `count` hits into patches of the given width; `surface(i)` gives hit i, if there is one.
+    /// Sorts `count` hits into patches of the given width; `surface(i)` gives hit i, if there is one.
     ///
     /// The result depends on the order of the hits alone, not on threads.
     pub fn new(
@@ -56,8 +56,8 @@ impl Patches {
             .filter_map(|hit| surface(hit).map(|Interaction { point, .. }| (key(&point, size(&point)), hit)))
             .collect();
         order.par_sort_unstable();
-        let groups: Vec<&[(u64, usize)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-        let patches = groups
+        let members_of: Vec<&[(u64, usize)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let patches = members_of
             .par_iter()
             .filter_map(|members| {
                 let k_d = members.iter().filter_map(|&(_, hit)| surface(hit)).map(|surface| surface.diffuse);
@@ -68,7 +68,7 @@ impl Patches {
             })
             .collect();
         let mut of_hit = vec![NONE; count];
-        for (patch, members) in (0..).zip(&groups) {
+        for (patch, members) in (0..).zip(&members_of) {
             members.iter().for_each(|&(_, hit)| of_hit[hit] = patch);
         }
         Self { patches, of_hit }

@@ -6,9 +6,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::gather::{Gathering, POINTS_PER_TASK};
+use super::interpolation::{DirectTransport, IndirectInterpolation};
+use super::mesh::IndirectMesh;
 use super::octahedral::IrradianceSums;
 use super::patches::Patches;
-use super::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::lookup::LookupScratch;
@@ -18,7 +19,7 @@ use crate::settings::IndirectForm;
 use crate::world::World;
 
 impl IndirectMesh {
-    /// Eq. (4) for new points: one bounce, then as many more as asked for or until nothing changes any more.
+    /// Eq. (4) for new points: one bounce, then as many more as the settings allow or until no value changes any more.
     /// Returns the number of occlusion rays that it took to see emitters and to keep light from leaking.
     pub(super) fn solve<A: Accel>(
         &mut self,

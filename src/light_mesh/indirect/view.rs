@@ -4,22 +4,14 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::IndirectMesh;
+use super::interpolation::IndirectInterpolation;
+use super::mesh::IndirectMesh;
 use super::octahedral::OctahedralWeights;
 use crate::accel::Accel;
 use crate::light_mesh::leaks::amounts_differ;
 use crate::light_mesh::lookup::{Lookup, LookupScratch};
-use crate::light_mesh::points::Neighbourhoods;
 use crate::scene::SurfacePoint;
 use crate::settings::{IndirectForm, IndirectShading, Normalization};
-
-/// How surface points interpolate an indirect mesh.
-pub struct IndirectInterpolation {
-    /// The kernel.
-    pub neighbourhoods: Neighbourhoods,
-    /// The settings that it follows from.
-    pub shading: IndirectShading,
-}
 
 /// An indirect mesh as surface points interpolate it.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::{IVec3, Vec3};
 
 use super::kernel::Kernel;
-use crate::light_mesh::store::UNKNOWN;
+use crate::light_mesh::slot::UNKNOWN;
 use crate::simd::{LANES, Lanes};
 
 /// Cells and packets of candidates that are kept before all are forgotten: some megabytes per thread.
@@ -24,11 +24,11 @@ pub struct PointPacket {
     pub ids: [u64; LANES],
     /// Their slots, as far as they are known.
     pub slots: [u32; LANES],
-    /// Those that were asked for.
+    /// Lanes whose points lay in the kernel of some surface point.
     pub needed: u16,
-    /// What the points give to a normal, see [`Surroundings::normal`]: RGB, and what they are compared by.
+    /// Irradiance of the points for one normal, [`Surroundings::normal`], by channel.
     pub lit: [Lanes; 3],
-    /// See above.
+    /// Amount of light at the points, summed over channels and directions; below 0 at points that don't count.
     pub amount: Lanes,
 }
 
@@ -43,7 +43,7 @@ impl PointPacket {
         amount: [0.0; LANES],
     };
 
-    /// Ids of the points that were asked for.
+    /// Ids of the points that lay in the kernel of some surface point.
     pub fn needed_ids(&self) -> impl Iterator<Item = u64> + '_ {
         (0..LANES).filter(|lane| self.needed >> lane & 1 == 1).map(|lane| self.ids[lane])
     }
@@ -63,8 +63,8 @@ impl PointPacket {
 
 /// The lanes whose weight, from 0 to 1, is at least 2⁻⁶³: what is less doesn't count beside any other.
 ///
-/// The second-highest bit of the exponent tells. Bits of their own per lane are folded together half by half: of a
-/// comparison, compilers take the sixteen answers out of a mask register one by one, which costs more than the weights.
+/// The second-highest bit of a weight's exponent decides. The lanes' bits are folded together half by half: the sixteen
+/// results of a comparison would be taken out of a mask register one by one, which costs more than the weights.
 #[inline(always)]
 fn that_count(weights: &Lanes) -> u16 {
     let mut bits = [0u32; LANES];
@@ -112,7 +112,7 @@ pub struct CellCache {
 
 impl CellCache {
     /// The packets around a cell; `surround` calls its argument for each point (id, slot, position) that may be in the
-    /// ball of some point of the cell, in a fixed order. Where much is kept already, `forget` hears of all packets
+    /// ball of some point of the cell, in a fixed order. Where much is kept already, `forget` receives all packets
     /// before they are dropped.
     #[inline(always)]
     pub fn around(

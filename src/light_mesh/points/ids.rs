@@ -10,7 +10,7 @@ use crate::Bounds;
 /// Bits of a point's id within its layer; those above name the layer.
 pub const LAYER_SHIFT: u32 = 55;
 
-/// Layers that ids can tell apart.
+/// Layers that ids can distinguish.
 pub const MOST_LAYERS: usize = 1 << (64 - LAYER_SHIFT);
 
 /// Cells lie within ±`CELL_RANGE` of the anchor along each axis: 3 · 18 bits, and one for layouts with two points per cell.

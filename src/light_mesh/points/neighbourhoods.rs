@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::cells::{CellCache, PointPacket, Surroundings};
 use super::kernel::Kernel;
-use super::{MeshError, Neighbours, PointSet};
+use super::neighbours::Neighbours;
+use super::point_set::{MeshError, PointSet};
 use crate::Bounds;
 use crate::scene::SurfacePoint;
 use crate::settings::{KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
@@ -19,7 +20,7 @@ struct Zone {
     /// The kernel of this radius, around any point.
     kernel: Kernel,
     /// Side of the cells whose surface points share a search for mesh points, and 1 over it; `None` where D_y is no
-    /// ball, or where coordinates are so large that they hardly tell cells apart.
+    /// ball, or where coordinates are so large that cells are hardly distinct.
     cells: Option<(f32, f32)>,
 }
 
@@ -27,7 +28,7 @@ struct Zone {
 /// that most of them don't need.
 const CELL_SIDE: f32 = 0.3;
 
-/// Cells are told apart up to this far from the origin, in units of their side.
+/// Cells are distinct up to this far from the origin, in units of their side.
 const FARTHEST_CELL: f32 = (1 << 20) as f32;
 
 /// Which layer of points and which kernel a surface point takes.
@@ -40,14 +41,14 @@ pub struct Neighbourhoods {
 
 impl Neighbourhoods {
     /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
-    pub const AUTO_SPACINGS: f32 = 120.0;
+    pub(crate) const AUTO_SPACINGS: f32 = 120.0;
 
-    /// Adds the layers that the settings ask for to `points`. An automatic spacing is the scene's diagonal over
+    /// Adds the layers that the settings name to `points`. An automatic spacing is the scene's diagonal over
     /// `auto_spacings`.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub fn new(
+    pub(crate) fn new(
         points: &mut PointSet,
         settings: &PointSettings,
         kernel: &KernelSettings,
@@ -79,7 +80,7 @@ impl Neighbourhoods {
     }
 
     /// About how many points the neighbourhoods of surface points can reach.
-    pub fn count(&self, points: &PointSet) -> u64 {
+    pub(crate) fn count(&self, points: &PointSet) -> u64 {
         let bounds = points.bounds();
         let count = |zone: &Zone| {
             let of = zone.bounds.unwrap_or(bounds);
@@ -101,12 +102,12 @@ impl Neighbourhoods {
 
     /// R at a position.
     #[inline(always)]
-    pub fn radius_at(&self, y: Vec3) -> f32 {
+    pub(crate) fn radius_at(&self, y: Vec3) -> f32 {
         self.zones[self.zone_number_at(y)].radius
     }
 
     /// The kernel of a surface point, unless the neighbourhood is the nearest point.
-    pub fn kernel(&self, surface: &SurfacePoint) -> Kernel {
+    pub(crate) fn kernel(&self, surface: &SurfacePoint) -> Kernel {
         self.kernel_in(&self.zones[self.zone_number_at(surface.position)], surface)
     }
 
@@ -136,7 +137,7 @@ impl Neighbourhoods {
     /// The kernel of a surface point, and all points that may lie in it, from the cell cache; `None` where that would be no
     /// help. `slot` gives the slots of points; `forget` receives the packets that the cache drops.
     #[inline(always)]
-    pub fn around<'a>(
+    pub(crate) fn around<'a>(
         &self,
         points: &PointSet,
         surface: &SurfacePoint,

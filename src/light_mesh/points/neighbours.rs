@@ -7,7 +7,7 @@ use super::kernel::Kernel;
 use crate::simd::{LANES, Lanes};
 
 /// Mesh points of one row of a regular grid that are weighed together: a register of AVX2.
-pub const ROW: usize = 8;
+pub(super) const ROW: usize = 8;
 
 /// Mesh points with weights, and slots once they are looked up; the order is fixed by the point set, so that sums never
 /// depend on timing.
@@ -22,13 +22,13 @@ pub struct Neighbours {
 impl Neighbours {
     /// Forgets all points.
     #[inline(always)]
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.count = 0;
     }
 
     /// Adds a point.
     #[inline(always)]
-    pub fn push(&mut self, id: u64, weight: f32) {
+    pub(crate) fn push(&mut self, id: u64, weight: f32) {
         self.push_row(|_| id, &[weight]);
     }
 
@@ -36,7 +36,7 @@ impl Neighbours {
     ///
     /// All are written and the end moves past those that count: in a ball's rows a branch would be a coin toss.
     #[inline(always)]
-    pub fn push_row(&mut self, id: impl Fn(usize) -> u64, weights: &[f32]) {
+    pub(crate) fn push_row(&mut self, id: impl Fn(usize) -> u64, weights: &[f32]) {
         self.make_room(ROW);
         for (i, &weight) in weights.iter().enumerate().take(ROW) {
             self.ids[self.count] = id(i);
@@ -47,7 +47,7 @@ impl Neighbours {
 
     /// Adds the points of a packet that are in `lanes`, with their slots.
     #[inline(always)]
-    pub fn push_packet(&mut self, packet: &PointPacket, weights: &Lanes, mut lanes: u16) {
+    pub(crate) fn push_packet(&mut self, packet: &PointPacket, weights: &Lanes, mut lanes: u16) {
         self.make_room(LANES);
         let room = self.count..self.count + LANES;
         let ids = &mut self.ids[room.clone()];
@@ -80,20 +80,20 @@ impl Neighbours {
     }
 
     /// Adds `first` to all ids.
-    pub fn offset_ids(&mut self, first: u64) {
+    pub(crate) fn offset_ids(&mut self, first: u64) {
         self.ids[..self.count].iter_mut().for_each(|id| *id += first);
     }
 
     /// Looks up the slots.
     #[inline(always)]
-    pub fn find_slots(&mut self, slot: impl Fn(u64) -> u32) {
+    pub(crate) fn find_slots(&mut self, slot: impl Fn(u64) -> u32) {
         for (found, &id) in self.slots.iter_mut().zip(&self.ids[..self.count]) {
             *found = slot(id);
         }
     }
 
     /// Drops the points that don't `pass`, by index and slot, unless none passes; returns whether any did.
-    pub fn keep(&mut self, mut pass: impl FnMut(usize, u32) -> bool) -> bool {
+    pub(crate) fn keep(&mut self, mut pass: impl FnMut(usize, u32) -> bool) -> bool {
         let mut kept = 0;
         for i in 0..self.count {
             if pass(i, self.slots[i]) {
@@ -112,8 +112,8 @@ impl Neighbours {
     /// Changes the weights so that their mean of a field that is linear in the height over the surface is the field at the
     /// surface, not at the points' centroid in front of it; `height` gives the points' heights by slot.
     ///
-    /// Where all points are about as high, which tells nothing of the slope, the weights stay as they are.
-    pub fn extrapolate_to_surface(&mut self, height: impl Fn(u32) -> f32) {
+    /// Where all points are about as high, from which no slope follows, the weights stay as they are.
+    pub(crate) fn extrapolate_to_surface(&mut self, height: impl Fn(u32) -> f32) {
         /// Spread of the heights, over their mean squared, from which on the slope counts for more than half.
         const LEAST_SPREAD: f32 = 0.02;
         let slots = &self.slots[..self.count];
@@ -136,13 +136,13 @@ impl Neighbours {
     }
 
     /// Leaves the first point alone.
-    pub fn keep_first(&mut self) {
+    pub(crate) fn keep_first(&mut self) {
         self.count = self.count.min(1);
     }
 
     /// Whether there are none.
     #[inline(always)]
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
     }
 
@@ -154,25 +154,25 @@ impl Neighbours {
 
     /// The points' slots, after [`Neighbours::find_slots`] or from packets.
     #[inline(always)]
-    pub fn slots(&self) -> &[u32] {
+    pub(crate) fn slots(&self) -> &[u32] {
         &self.slots[..self.count]
     }
 
     /// The points' weights: above 0, unless they are [extrapolated](Neighbours::extrapolate_to_surface).
     #[inline(always)]
-    pub fn weights(&self) -> &[f32] {
+    pub(crate) fn weights(&self) -> &[f32] {
         &self.weights[..self.count]
     }
 
     /// Slots and weights.
     #[inline(always)]
-    pub fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         self.slots().iter().copied().zip(self.weights().iter().copied())
     }
 
     /// Sum of the weights.
     #[inline(always)]
-    pub fn total_weight(&self) -> f32 {
+    pub(crate) fn total_weight(&self) -> f32 {
         self.weights().iter().sum()
     }
 }

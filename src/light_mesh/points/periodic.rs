@@ -38,11 +38,11 @@ pub struct PeriodicPoints {
 /// How the points of a tile are laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PeriodicLayout {
-    /// Corners and centres of cubes of one spacing: two points per cube.
+    /// Corners and centres of cells of one spacing: two points per cell.
     BodyCentred,
-    /// One point anywhere in each cube of one spacing.
+    /// One point anywhere in each cell of one spacing.
     Jittered,
-    /// As many points as cubes, none closer to another than need be.
+    /// As many points as cells, none closer to another than need be.
     BlueNoise,
 }
 

@@ -1,83 +1,8 @@
 //! Which mesh points are known, and in which slot of their mesh's arrays their values lie.
 
 mod point_mask;
+mod point_store;
 mod slots;
 
 pub use point_mask::{NeededPoints, PointMask};
-pub use slots::{SlotTable, UNKNOWN};
-
-use glam::Vec3;
-use rayon::prelude::*;
-
-use super::leaks::{PROBES, is_inside};
-use super::points::PointSet;
-use crate::accel::Accel;
-use crate::scene::Scene;
-
-/// The points of a light mesh with their slots, and what is known of each whatever the mesh is of.
-pub struct PointStore {
-    /// The points.
-    pub points: PointSet,
-    slots: SlotTable,
-    /// By slot.
-    positions: Vec<Vec3>,
-    /// Whether a point lies inside of geometry, by slot, as far as anybody wanted to know.
-    inside: Vec<bool>,
-}
-
-impl PointStore {
-    /// With no point known.
-    pub fn new(points: PointSet) -> Self {
-        Self { points, slots: SlotTable::default(), positions: Vec::new(), inside: Vec::new() }
-    }
-
-    /// Makes the needed points known; returns the positions of those that were not, in slot order.
-    pub fn allocate(&mut self, needed: &PointMask) -> &[Vec3] {
-        let Self { points, slots, positions, .. } = self;
-        let known = |slots: &SlotTable, id: u64| {
-            points.twins(id).map(|twin| slots.slot(twin)).find(|slot| *slot != UNKNOWN)
-        };
-        let new = slots.allocate(needed, known);
-        let first = positions.len();
-        positions.extend(new.into_iter().map(|id| points.position(id)));
-        &positions[first..]
-    }
-
-    /// Slot of a point, or [`UNKNOWN`].
-    #[inline(always)]
-    pub fn slot(&self, id: u64) -> u32 {
-        self.slots.slot(id)
-    }
-
-    /// Positions of the known points, by slot.
-    #[inline(always)]
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    /// Whether the point in a slot lies inside of geometry; false where that was never [found out](Self::find_inside).
-    #[inline(always)]
-    pub fn is_inside(&self, slot: u32) -> bool {
-        self.inside.get(slot as usize).is_some_and(|&inside| inside)
-    }
-
-    /// Finds out which of the first `count` known points lie inside of geometry, once for each; returns the number of rays.
-    pub fn find_inside<A: Accel>(&mut self, accel: &A, scene: &Scene, count: usize) -> u64 {
-        let last = count.min(self.positions.len());
-        let new = self.positions.get(self.inside.len()..last).unwrap_or_default();
-        self.inside.par_extend(new.par_iter().map(|&x| is_inside(accel, scene, x)));
-        new.len() as u64 * PROBES as u64
-    }
-
-    /// Takes over what is known of further points, whose slots follow those of which it was known before.
-    pub fn extend_inside(&mut self, inside: Vec<bool>) {
-        self.inside.extend(inside);
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.slots.memory_bytes()
-            + self.positions.capacity() * size_of::<Vec3>()
-            + self.inside.capacity() * size_of::<bool>()
-    }
-}
+pub use point_store::PointStore;

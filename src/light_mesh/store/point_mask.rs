@@ -6,7 +6,7 @@ pub struct PointMask(Vec<(u64, u64)>);
 
 impl PointMask {
     /// Union of unordered lists of (brick, points of the brick).
-    pub fn union(parts: impl IntoIterator<Item = (u64, u64)>) -> Self {
+    pub(crate) fn union(parts: impl IntoIterator<Item = (u64, u64)>) -> Self {
         let mut all: Vec<(u64, u64)> = parts.into_iter().collect();
         all.sort_unstable_by_key(|&(brick, _)| brick);
         all.dedup_by(|next, kept| {
@@ -20,20 +20,13 @@ impl PointMask {
     }
 
     /// Bricks in ascending order, each with the bits of its points.
-    pub fn bricks(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+    pub(crate) fn bricks(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
         self.0.iter().copied()
     }
 
     /// Number of points.
     pub fn len(&self) -> u64 {
         self.0.iter().map(|&(_, mask)| u64::from(mask.count_ones())).sum()
-    }
-
-    /// Ids of the points in ascending order.
-    pub fn ids(&self) -> impl Iterator<Item = u64> + '_ {
-        self.0.iter().flat_map(|&(brick, mask)| {
-            (0..64).filter(move |place| mask >> place & 1 == 1).map(move |place| brick * 64 + place)
-        })
     }
 }
 
@@ -55,7 +48,7 @@ impl Default for NeededPoints {
 impl NeededPoints {
     /// Adds a point.
     #[inline(always)]
-    pub fn insert(&mut self, id: u64) {
+    pub(crate) fn insert(&mut self, id: u64) {
         let brick = id / 64;
         let bit = 1 << (id % 64);
         if self.entries[self.last].0 == brick {
@@ -121,6 +114,9 @@ mod tests {
                 [i * 64 * 37 + a.min(b), i * 64 * 37 + a.max(b)]
             })
             .collect();
-        assert_eq!(mask.ids().collect::<Vec<_>>(), expected);
+        let ids = mask.bricks().flat_map(|(brick, places)| {
+            (0..64).filter(move |place| places >> place & 1 == 1).map(move |place| brick * 64 + place)
+        });
+        assert_eq!(ids.collect::<Vec<_>>(), expected);
     }
 }

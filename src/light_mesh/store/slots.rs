@@ -7,10 +7,8 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::PointMask;
-
-/// Marks a point that has no value yet: step 1 of the paper's algorithm.
-pub const UNKNOWN: u32 = u32::MAX;
+use super::point_mask::PointMask;
+use crate::light_mesh::slot::UNKNOWN;
 
 /// Multiplicative hashing of brick numbers, which are well spread already in their low bits.
 #[derive(Default)]

@@ -143,11 +143,11 @@ impl<A: Accel> BlockIntegrator for ReferenceIntegrator<'_, A> {
 
 /// Maps the unit cube to the kernel's ball, equal volumes to equal volumes, and folds the half that isn't admitted onto the
 /// other.
-fn in_kernel(kernel: &Kernel, cube: Vec3) -> Vec3 {
-    let z = 1.0 - 2.0 * cube.y;
+fn in_kernel(kernel: &Kernel, unit: Vec3) -> Vec3 {
+    let z = 1.0 - 2.0 * unit.y;
     let ring = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = (std::f32::consts::TAU * cube.z).sin_cos();
-    let offset = Vec3::new(ring * cos, ring * sin, z) * (cube.x.cbrt() * kernel.radius);
+    let (sin, cos) = (std::f32::consts::TAU * unit.z).sin_cos();
+    let offset = Vec3::new(ring * cos, ring * sin, z) * (unit.x.cbrt() * kernel.radius);
     let position = kernel.center + offset;
     if kernel.admits(position) { position } else { kernel.center - offset }
 }

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::GenerateError;
+use super::error::GenerateError;
 
 /// Writes the content of one file.
 pub type Content<'a> = &'a dyn Fn(&mut dyn Write) -> io::Result<()>;

@@ -9,7 +9,8 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::{GenerateError, write_files};
+use super::error::GenerateError;
+use super::files::write_files;
 use crate::sampling::SplitMix64;
 
 /// What to generate.

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
+use super::error::GenerateError;
+use super::files::write_files;
 use super::shapes::{ball, cuboid, cylinder, object, quad};
-use super::{GenerateError, write_files};
 
 /// A hall; see [`Interior::BAYS`] and [`Interior::LAMPS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

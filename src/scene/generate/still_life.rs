@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
+use super::error::GenerateError;
+use super::files::write_files;
 use super::shapes::{ball, cuboid, cylinder, object, quad};
-use super::{GenerateError, write_files};
 
 const MATERIALS: &str = "\
 newmtl floor

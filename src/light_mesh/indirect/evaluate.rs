@@ -1,0 +1,78 @@
+//! Evaluation: making needed indirect mesh points known, and all that they depend on.
+
+use super::gather::Gathering;
+use super::interpolation::{DirectTransport, IndirectInterpolation};
+use super::mesh::IndirectMesh;
+use crate::accel::Accel;
+use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
+use crate::light_mesh::store::PointMask;
+use crate::settings::Leaks;
+use crate::world::World;
+
+/// What the evaluation of indirect mesh points took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct IndirectEvaluation {
+    /// Indirect points that got a value.
+    pub evaluated: u64,
+    /// Rays from indirect mesh points.
+    pub rays: u64,
+    /// Direct points that hits lay near to.
+    pub direct_needed: u64,
+    /// Evaluation of those that were unknown.
+    pub direct: DirectEvaluation,
+    /// Occlusion rays towards emissive triangles and against leaks.
+    pub shadow: u64,
+    /// Rays that look for back faces around points that were known before.
+    pub inside: u64,
+}
+
+impl IndirectMesh {
+    /// Evaluates those of the needed points that are unknown, and all that they depend on; direct mesh points at the
+    /// hits are evaluated on the way.
+    pub fn evaluate<A: Accel>(
+        &mut self,
+        world: World<A>,
+        direct: &mut DirectMesh,
+        transport: DirectTransport,
+        interpolation: &IndirectInterpolation,
+        needed: PointMask,
+    ) -> IndirectEvaluation {
+        let mut evaluation = IndirectEvaluation::default();
+        let mut gathering = Gathering::default();
+        let mut needed = needed;
+        let leaks = interpolation.shading.kernel.leaks;
+        loop {
+            let known = self.store.positions().len();
+            let new = self.store.allocate(&needed).to_vec();
+            if new.is_empty() {
+                break;
+            }
+            let hits = self.trace(world.accel, &new);
+            if leaks == Leaks::Invalidate {
+                evaluation.inside += self.store.find_inside(world.accel, world.scene, known);
+                let inside = self.inside_by_hits(world.scene, &new, &hits);
+                self.store.extend_inside(inside);
+            }
+            evaluation.evaluated += new.len() as u64;
+            evaluation.rays += hits.len() as u64;
+            let lookup = direct.view(world.lights, transport.interpolation).lookup;
+            let direct_needed = self.needed_at(world.scene, &new, &hits, lookup);
+            evaluation.direct_needed += direct_needed.len();
+            evaluation.direct.add(direct.evaluate(world, transport.interpolation, &direct_needed));
+            needed = if self.settings.bounces > 1 {
+                self.needed_at(world.scene, &new, &hits, self.view(interpolation).lookup)
+            } else {
+                PointMask::default()
+            };
+            gathering.points.extend(new);
+            gathering.hits.extend(hits);
+        }
+        if leaks == Leaks::Invalidate {
+            evaluation.inside += self.store.find_inside(world.accel, world.scene, usize::MAX);
+        }
+        if !gathering.points.is_empty() {
+            evaluation.shadow += self.solve(world, direct, transport, interpolation, &gathering);
+        }
+        evaluation
+    }
+}

@@ -1,0 +1,69 @@
+//! The indirect light mesh: its points, and the light that is known at them.
+
+use super::interpolation::IndirectInterpolation;
+use super::octahedral::ENTRIES;
+use crate::Bounds;
+use crate::light_mesh::points::{MeshError, Neighbourhoods, PointSet};
+use crate::light_mesh::store::PointStore;
+use crate::sampling::SphereStrata;
+use crate::settings::{IndirectForm, IndirectSettings, IndirectShading};
+
+/// Indirect light mesh.
+pub struct IndirectMesh {
+    pub(super) store: PointStore,
+    pub(super) strata: SphereStrata,
+    pub(super) settings: IndirectSettings,
+    /// IndirectLight by slot, [`IndirectMesh::entries`] each, as means over directions; the first is that of all light.
+    pub(super) values: Vec<[f32; 3]>,
+}
+
+impl IndirectMesh {
+    /// Mesh over a scene of the given bounds, with no point known.
+    pub fn new(bounds: Bounds, settings: &IndirectSettings) -> Self {
+        Self {
+            store: PointStore::new(PointSet::new(bounds)),
+            strata: SphereStrata::new(settings.directions),
+            settings: settings.clone(),
+            values: Vec::new(),
+        }
+    }
+
+    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub fn interpolation(&mut self, shading: &IndirectShading) -> Result<IndirectInterpolation, MeshError> {
+        let neighbourhoods = Neighbourhoods::new(
+            &mut self.store.points,
+            &self.settings.points,
+            &shading.kernel,
+            Neighbourhoods::AUTO_SPACINGS / IndirectSettings::COARSENESS,
+        )?;
+        Ok(IndirectInterpolation { neighbourhoods, shading: shading.clone() })
+    }
+
+    /// RGB values per mesh point.
+    pub(super) fn entries(&self) -> usize {
+        match self.settings.form {
+            IndirectForm::Scalar => 1,
+            IndirectForm::Directional => ENTRIES,
+        }
+    }
+
+    /// Points, and what is known of them.
+    pub(crate) fn store(&self) -> &PointStore {
+        &self.store
+    }
+
+    /// Bytes held by slots and values.
+    pub fn memory_bytes(&self) -> usize {
+        self.store.memory_bytes() + self.values.capacity() * size_of::<[f32; 3]>()
+    }
+
+    /// The values of the point in a slot.
+    #[inline(always)]
+    pub(super) fn value(&self, slot: u32) -> &[[f32; 3]] {
+        let entries = self.entries();
+        &self.values[slot as usize * entries..][..entries]
+    }
+}

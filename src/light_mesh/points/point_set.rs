@@ -1,0 +1,176 @@
+//! Sets of mesh points: one interface over all layouts and spacings.
+
+use glam::Vec3;
+
+use super::ids::{LAYER_SHIFT, MOST_LAYERS, anchor, too_fine};
+use super::kernel::Kernel;
+use super::lattice::Lattice;
+use super::list::PointList;
+use super::neighbours::Neighbours;
+use super::periodic::{PeriodicLayout, PeriodicPoints};
+use crate::Bounds;
+use crate::settings::PointLayout;
+
+/// Why a light mesh can't be set up.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// Spacing below what coordinates or ids of points can express.
+    #[error("spacing {0} of the light mesh is too fine for a scene of this size")]
+    TooFine(Vec3),
+    /// More different spacings than the ids of points can distinguish.
+    #[error("a light mesh has points of at most {MOST_LAYERS} different spacings")]
+    TooManySpacings,
+}
+
+/// The positions of the mesh points of one layer: one interface over all layouts.
+enum Positions {
+    Lattice(Lattice),
+    Periodic(PeriodicPoints),
+    List(PointList),
+}
+
+/// Runs `$body` with `$positions` bound to the layout's own type.
+macro_rules! with_positions {
+    ($layer:expr, $positions:ident => $body:expr) => {
+        match &$layer.positions {
+            Positions::Lattice($positions) => $body,
+            Positions::Periodic($positions) => $body,
+            Positions::List($positions) => $body,
+        }
+    };
+}
+
+/// All points of one layout and spacing.
+struct Layer {
+    layout: PointLayout,
+    spacing: Vec3,
+    positions: Positions,
+    /// Id of its first point.
+    first_id: u64,
+}
+
+/// Mesh points of one or several layouts and spacings, their *layers*, over a scene.
+///
+/// Layers are added as settings need them and never change, so that ids stay valid whatever settings follow.
+pub struct PointSet {
+    bounds: Bounds,
+    layers: Vec<Layer>,
+}
+
+impl PointSet {
+    /// Without layers, for a scene of the given bounds.
+    pub(crate) fn new(bounds: Bounds) -> Self {
+        Self { bounds, layers: Vec::new() }
+    }
+
+    /// Bounds of the scene.
+    pub(crate) fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Number of the layer of a layout and spacing; it is added if there is none.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub(super) fn layer(&mut self, layout: &PointLayout, spacing: Vec3) -> Result<usize, MeshError> {
+        // A list has no spacing.
+        let is_list = matches!(layout, PointLayout::List(_));
+        let same = |layer: &Layer| layer.layout == *layout && (is_list || layer.spacing == spacing);
+        if let Some(known) = self.layers.iter().position(same) {
+            return Ok(known);
+        }
+        let number = self.layers.len();
+        if number == MOST_LAYERS {
+            return Err(MeshError::TooManySpacings);
+        }
+        let anchor = anchor(self.bounds, spacing);
+        let periodic = |layout, seed| Positions::Periodic(PeriodicPoints::new(anchor, spacing, layout, seed));
+        let positions = match layout {
+            PointLayout::List(positions) => Positions::List(PointList::new(positions)),
+            _ if too_fine(self.bounds, spacing) => return Err(MeshError::TooFine(spacing)),
+            PointLayout::Regular => Positions::Lattice(Lattice::new(anchor, spacing)),
+            PointLayout::BodyCentred => periodic(PeriodicLayout::BodyCentred, 0),
+            PointLayout::Jittered { seed } => periodic(PeriodicLayout::Jittered, *seed),
+            PointLayout::BlueNoise { seed } => periodic(PeriodicLayout::BlueNoise, *seed),
+        };
+        let first_id = (number as u64) << LAYER_SHIFT;
+        self.layers.push(Layer { layout: layout.clone(), spacing, positions, first_id });
+        Ok(number)
+    }
+
+    /// Position of a point.
+    pub fn position(&self, id: u64) -> Vec3 {
+        let layer = &self.layers[(id >> LAYER_SHIFT) as usize];
+        with_positions!(layer, positions => positions.position(id - layer.first_id))
+    }
+
+    /// Points of other layers at exactly the position of a point.
+    pub(crate) fn twins(&self, id: u64) -> impl Iterator<Item = u64> + '_ {
+        let own = (id >> LAYER_SHIFT) as usize;
+        let position = (self.layers.len() > 1).then(|| self.position(id));
+        let others = self.layers.iter().enumerate().filter(move |(number, _)| *number != own);
+        others.filter_map(move |(_, layer)| {
+            let twin = with_positions!(layer, positions => positions.id_at(position?));
+            twin.map(|id| layer.first_id + id)
+        })
+    }
+
+    /// About how many points of a layer lie in a box.
+    pub(super) fn count_in(&self, layer: usize, bounds: Bounds) -> u64 {
+        with_positions!(&self.layers[layer], positions => positions.count_in(bounds))
+    }
+
+    /// The points of a layer in a kernel, in a fixed order.
+    #[inline(always)]
+    pub(super) fn gather(&self, layer: usize, kernel: &Kernel, out: &mut Neighbours) {
+        let layer = &self.layers[layer];
+        with_positions!(layer, positions => positions.gather(kernel, out));
+        if layer.first_id > 0 {
+            out.offset_ids(layer.first_id);
+        }
+    }
+
+    /// The point of a layer that is nearest to the kernel's centre, if there is one among those that the kernel's half-space
+    /// admits.
+    pub(super) fn nearest(&self, layer: usize, kernel: &Kernel) -> u64 {
+        let layer = &self.layers[layer];
+        layer.first_id + with_positions!(layer, positions => positions.nearest(kernel))
+    }
+
+    /// Calls `each(id, position)` for all points of a layer in a box, and perhaps some beside it, in a fixed order.
+    pub(super) fn for_each_in_box(
+        &self,
+        layer: usize,
+        min: Vec3,
+        max: Vec3,
+        mut each: impl FnMut(u64, Vec3),
+    ) {
+        let layer = &self.layers[layer];
+        with_positions!(layer, positions => {
+            positions.for_each_in_box(min, max, |id, position| each(layer.first_id + id, position));
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A layout and spacing that was there before is the same layer again: its points keep their ids.
+    #[test]
+    fn layers_are_kept() {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::splat(8.0) };
+        let mut points = PointSet::new(bounds);
+        let coarse = points.layer(&PointLayout::Regular, Vec3::ONE).unwrap();
+        let fine = points.layer(&PointLayout::Regular, Vec3::splat(0.5)).unwrap();
+        assert_ne!(coarse, fine);
+        assert_eq!(points.layer(&PointLayout::Regular, Vec3::ONE), Ok(coarse));
+        let jittered = PointLayout::Jittered { seed: 1 };
+        assert_ne!(points.layer(&jittered, Vec3::ONE), Ok(coarse));
+        // Every coarse point has a fine twin, and that one leads back.
+        points.for_each_in_box(coarse, bounds.min, bounds.max, |id, position| {
+            let twin = points.twins(id).find(|&twin| points.twins(twin).any(|back| back == id));
+            assert_eq!(twin.map(|twin| points.position(twin)), Some(position));
+        });
+    }
+}

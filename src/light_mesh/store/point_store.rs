@@ -1,0 +1,80 @@
+//! The known points of a light mesh: their slots, positions, and which of them lie inside of geometry.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::point_mask::PointMask;
+use super::slots::SlotTable;
+use crate::accel::Accel;
+use crate::light_mesh::leaks::{PROBES, is_inside};
+use crate::light_mesh::points::PointSet;
+use crate::light_mesh::slot::UNKNOWN;
+use crate::scene::Scene;
+
+/// The points of a light mesh with their slots, and what is known of each whatever the mesh is of.
+pub struct PointStore {
+    /// The points.
+    pub points: PointSet,
+    slots: SlotTable,
+    /// By slot.
+    positions: Vec<Vec3>,
+    /// Whether a point lies inside of geometry, by slot, as far as anybody wanted to know.
+    inside: Vec<bool>,
+}
+
+impl PointStore {
+    /// With no point known.
+    pub(crate) fn new(points: PointSet) -> Self {
+        Self { points, slots: SlotTable::default(), positions: Vec::new(), inside: Vec::new() }
+    }
+
+    /// Makes the needed points known; returns the positions of those that were not, in slot order.
+    pub(crate) fn allocate(&mut self, needed: &PointMask) -> &[Vec3] {
+        let Self { points, slots, positions, .. } = self;
+        let known = |slots: &SlotTable, id: u64| {
+            points.twins(id).map(|twin| slots.slot(twin)).find(|slot| *slot != UNKNOWN)
+        };
+        let new = slots.allocate(needed, known);
+        let first = positions.len();
+        positions.extend(new.into_iter().map(|id| points.position(id)));
+        &positions[first..]
+    }
+
+    /// Slot of a point; `u32::MAX` where it is not known.
+    #[inline(always)]
+    pub(crate) fn slot(&self, id: u64) -> u32 {
+        self.slots.slot(id)
+    }
+
+    /// Positions of the known points, by slot.
+    #[inline(always)]
+    pub(crate) fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Whether the point in a slot lies inside of geometry; false where that was never [found out](Self::find_inside).
+    #[inline(always)]
+    pub(crate) fn is_inside(&self, slot: u32) -> bool {
+        self.inside.get(slot as usize).is_some_and(|&inside| inside)
+    }
+
+    /// Finds out which of the first `count` known points lie inside of geometry, once for each; returns the number of rays.
+    pub(crate) fn find_inside<A: Accel>(&mut self, accel: &A, scene: &Scene, count: usize) -> u64 {
+        let last = count.min(self.positions.len());
+        let new = self.positions.get(self.inside.len()..last).unwrap_or_default();
+        self.inside.par_extend(new.par_iter().map(|&x| is_inside(accel, scene, x)));
+        new.len() as u64 * PROBES as u64
+    }
+
+    /// Takes over what is known of further points, whose slots follow those of which it was known before.
+    pub(crate) fn extend_inside(&mut self, inside: Vec<bool>) {
+        self.inside.extend(inside);
+    }
+
+    /// Bytes held.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.slots.memory_bytes()
+            + self.positions.capacity() * size_of::<Vec3>()
+            + self.inside.capacity() * size_of::<bool>()
+    }
+}

@@ -1,0 +1,38 @@
+//! Why nothing is rendered.
+
+use crate::accel::BackendError;
+use crate::image::ImageError;
+use crate::light_mesh::points::MeshError;
+use crate::scene::{CameraError, SceneError};
+use crate::settings::SettingsError;
+
+/// Why a scene can't be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The scene contradicts itself.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// There is no acceleration structure.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+}
+
+/// Why there is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A camera that sees nothing.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A setting out of its range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The light meshes can't be set up.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The image can't be held.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A [`StopToken`](super::StopToken) stopped the render.
+    #[error("the render was stopped")]
+    Stopped,
+}
