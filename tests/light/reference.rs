@@ -187,7 +187,7 @@ fn reference_and_dense_mesh_agree_under_every_leak_rule() {
                     let off = mean_difference(mesh, reference) / scale;
                     println!("{name}, view {view}, {estimator}, {leaks}: {off:.4}");
                     assert!(
-                        off < 0.02,
+                        off < 0.01,
                         "{name}, view {view}, {estimator}, {leaks}: off by {off} of the lit view's mean"
                     );
                 }
