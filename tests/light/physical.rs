@@ -179,6 +179,11 @@ fn the_boards_match_the_path_tracers_and_many_bounces_tint_them() {
     let mut pixels: Vec<usize> = (0..materials.len()).filter(white).collect();
     pixels.sort_by(|&a, &b| strength(b).total_cmp(&strength(a)));
     pixels.truncate(pixels.len() / 10);
+    // At the foot of a board the extrapolated field may fall to 0, here and there: no light has no hue.
+    let strongest = pixels.len();
+    let has_light = |image: &Image, pixel: usize| image.pixels()[pixel] != [0.0; 3];
+    pixels.retain(|&pixel| has_light(&many.ours, pixel) && has_light(&one.ours, pixel));
+    assert!((strongest - pixels.len()) * 100 <= strongest, "{} pixels are black", strongest - pixels.len());
     let mut errors = [0.0f32; 2];
     for pixel in &pixels {
         let theirs = tint(&many.theirs, &[*pixel]);
