@@ -41,11 +41,12 @@ impl Session {
         Ok(Self::of_valid(scene, backend))
     }
 
-    /// A session with an acceleration structure that was built from the scene's geometry before.
+    /// A session with an acceleration structure that was built from this scene's geometry before.
     ///
     /// # Errors
     /// [`SessionError::Scene`].
-    pub fn with_backend(scene: Scene, backend: Backend) -> Result<Self, SessionError> {
+    #[cfg(feature = "cli")]
+    pub(crate) fn with_backend(scene: Scene, backend: Backend) -> Result<Self, SessionError> {
         scene.validate()?;
         Ok(Self::of_valid(scene, backend))
     }
