@@ -247,7 +247,11 @@ impl Scene {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
         let lanes = Valid::new(active, &mut packet.ray, self.largest_coordinate());
         if !self.is_native(N) {
-            return self.intersect_lanes(&lanes, packet);
+            return if N == 16 && self.is_native(8) {
+                self.intersect_halves(active, packet, coherent);
+            } else {
+                self.intersect_lanes(&lanes, packet);
+            };
         }
         let (valid, scene, packet) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
         // SAFETY: the scene is committed; flags and packet are aligned and of the layout of N lanes
@@ -285,13 +289,14 @@ impl Scene {
     ) -> u32 {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
         let lanes = Valid::new(active, packet, self.largest_coordinate());
+        if N == 16 && self.is_native(8) && (!self.is_native(16) || coherent && matches!(self.api(), Api::V3(_))) {
+            // Processors with AVX2 and no AVX-512 have packets of 8. Where there are such of 16, Debian's 3.13.5 never
+            // returns from some coherent occlusion queries: its AVX-512 code stores 16 bits of a lane mask and
+            // reads back 64. Two coherent packets of 8 are faster than an incoherent one of 16.
+            return self.occluded_halves(active, packet, coherent);
+        }
         if !self.is_native(N) {
             return self.occluded_lanes(&lanes, packet);
-        }
-        if N == 16 && coherent && matches!(self.api(), Api::V3(_)) {
-            // Debian's 3.13.5 never returns from some coherent 16-wide occlusion queries: its AVX-512 code stores 16
-            // bits of a lane mask and reads back 64. Two coherent packets of 8 are faster than an incoherent one of 16.
-            return self.occluded_halves(active, packet);
         }
         let (valid, scene, rays) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
         // SAFETY: as in `intersect_packet`.
@@ -318,32 +323,49 @@ impl Scene {
         blocked(&lanes, &packet.tfar)
     }
 
-    /// A coherent packet of 16 as two of 8.
+    /// A packet of 16 as two of 8.
     #[inline]
-    fn occluded_halves<const N: usize>(&self, active: u32, packet: &mut RayPacket<N>) -> u32 {
+    fn occluded_halves<const N: usize>(&self, active: u32, packet: &mut RayPacket<N>, coherent: bool) -> u32 {
         let mut mask = 0;
         for first in [0, 8] {
             let lanes = active >> first & 0xff;
             if lanes == 0 {
                 continue;
             }
-            let eight = first..first + 8;
-            let mut half = RayPacket::<8>::empty();
-            half.org_x.copy_from_slice(&packet.org_x[eight.clone()]);
-            half.org_y.copy_from_slice(&packet.org_y[eight.clone()]);
-            half.org_z.copy_from_slice(&packet.org_z[eight.clone()]);
-            half.tnear.copy_from_slice(&packet.tnear[eight.clone()]);
-            half.dir_x.copy_from_slice(&packet.dir_x[eight.clone()]);
-            half.dir_y.copy_from_slice(&packet.dir_y[eight.clone()]);
-            half.dir_z.copy_from_slice(&packet.dir_z[eight.clone()]);
-            half.tfar.copy_from_slice(&packet.tfar[eight.clone()]);
-            mask |= self.occluded_packet(lanes, &mut half, true) << first;
-            packet.tfar[eight].copy_from_slice(&half.tfar);
+            let mut half = half_of(packet, first);
+            mask |= self.occluded_packet(lanes, &mut half, coherent) << first;
+            packet.tfar[first..first + 8].copy_from_slice(&half.tfar);
         }
         mask
     }
 
-    /// [`Scene::intersect_packet`] where the processor has no such packets. Version 3 would pass over the
+    /// The same of a closest-hit query.
+    #[inline]
+    fn intersect_halves<const N: usize>(&self, active: u32, packet: &mut RayHitPacket<N>, coherent: bool) {
+        for first in [0, 8] {
+            let lanes = active >> first & 0xff;
+            if lanes == 0 {
+                continue;
+            }
+            let eight = first..first + 8;
+            let mut half = RayHitPacket { ray: half_of(&packet.ray, first), hit: RayHitPacket::<8>::empty().hit };
+            self.intersect_packet(lanes, &mut half, coherent);
+            packet.ray.tfar[eight.clone()].copy_from_slice(&half.ray.tfar);
+            let (from, to) = (&half.hit, &mut packet.hit);
+            for lane in (0..8).filter(|lane| from.geom_id[*lane] != INVALID_ID) {
+                to.ng_x[first + lane] = from.ng_x[lane];
+                to.ng_y[first + lane] = from.ng_y[lane];
+                to.ng_z[first + lane] = from.ng_z[lane];
+                to.u[first + lane] = from.u[lane];
+                to.v[first + lane] = from.v[lane];
+                to.prim_id[first + lane] = from.prim_id[lane];
+                to.geom_id[first + lane] = from.geom_id[lane];
+                to.inst_id[first + lane] = from.inst_id[lane];
+            }
+        }
+    }
+
+    /// [`Scene::intersect_packet`] where the processor has no packets at all. Version 3 would pass over the
     /// lane mask there, and trace inactive lanes as well.
     #[cold]
     fn intersect_lanes<const N: usize>(&self, lanes: &Valid, packet: &mut RayHitPacket<N>) {
@@ -371,6 +393,22 @@ impl Scene {
         }
         mask
     }
+}
+
+/// Eight lanes of a packet, from `first` on.
+#[inline(always)]
+fn half_of<const N: usize>(packet: &RayPacket<N>, first: usize) -> RayPacket<8> {
+    let eight = first..first + 8;
+    let mut half = RayPacket::empty();
+    half.org_x.copy_from_slice(&packet.org_x[eight.clone()]);
+    half.org_y.copy_from_slice(&packet.org_y[eight.clone()]);
+    half.org_z.copy_from_slice(&packet.org_z[eight.clone()]);
+    half.tnear.copy_from_slice(&packet.tnear[eight.clone()]);
+    half.dir_x.copy_from_slice(&packet.dir_x[eight.clone()]);
+    half.dir_y.copy_from_slice(&packet.dir_y[eight.clone()]);
+    half.dir_z.copy_from_slice(&packet.dir_z[eight.clone()]);
+    half.tfar.copy_from_slice(&packet.tfar[eight]);
+    half
 }
 
 fn ray_of_lane<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {
