@@ -14,7 +14,7 @@ use lightmesh::light_mesh::direct::{
     Basis, DirectField, DirectInterpolation, DirectMesh, DirectView, spherical_harmonics,
 };
 use lightmesh::light_mesh::lookup::{Lookup, LookupScratch};
-use lightmesh::light_mesh::points::Neighbours;
+use lightmesh::light_mesh::points::{AutoSpacing, Neighbours};
 use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{
@@ -82,7 +82,8 @@ fn mesh(lights: usize, spacings: f32, estimator: Estimator) -> (DirectMesh, Dire
         ..KernelSettings::default()
     };
     let mut mesh = DirectMesh::new(scene(lights).bounds());
-    let shading = mesh.interpolation(&points, &kernel, estimator).expect("a modest grid");
+    let shading =
+        mesh.interpolation(&points, &kernel, estimator, AutoSpacing::AVERAGED).expect("a modest grid");
     (mesh, shading)
 }
 

@@ -9,6 +9,7 @@ use super::timing::timed;
 use super::{BenchError, BenchOptions};
 use crate::accel::{Accel, Backend, Coherence, PacketLanes, RayPacket, with_accel};
 use crate::light_mesh::direct::{Basis, DirectField, DirectMesh};
+use crate::light_mesh::points::AutoSpacing;
 use crate::lights::{EmissiveTriangles, PackedLights};
 use crate::render::RenderError;
 use crate::scene::{Light, Ray, Scene, SurfacePoint};
@@ -109,7 +110,9 @@ fn mesh_points(
         ..KernelSettings::default()
     };
     let mut mesh = DirectMesh::new(scene.bounds());
-    let shading = mesh.interpolation(&points, &kernel, Estimator::PerLight).map_err(RenderError::from)?;
+    let shading = mesh
+        .interpolation(&points, &kernel, Estimator::PerLight, AutoSpacing::AVERAGED)
+        .map_err(RenderError::from)?;
     let middle = SurfacePoint::flat(scene.bounds().center(), Vec3::Y);
     let needed = mesh.view(lights, &shading).lookup.needed_anywhere([middle].iter());
     let emissive = EmissiveTriangles::default();

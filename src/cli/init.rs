@@ -15,7 +15,7 @@ use crate::render::render;
 use crate::scene::load::scene_file::FalloffName;
 use crate::scene::load::{ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, Light, LightKind};
-use crate::settings::{Integrator, Resolve, Spacing};
+use crate::settings::{Integrator, Radius, Resolve};
 
 /// What `init` takes.
 #[derive(Args, Debug)]
@@ -119,11 +119,14 @@ fn scene_file(
     line("# Stops; each doubles the brightness of PNG images.".to_owned());
     line(format!("exposure = {exposure:?}"));
     line("\n[light_mesh]".to_owned());
-    if let Spacing::Units(spacing) = loaded.settings.mesh.direct.spacing {
-        line("# Distance between mesh points, from the model's size and its lights.".to_owned());
-        line(format!("spacing = {:?}", spacing.x));
+    line(
+        "# Distance between mesh points; with traced shadow edges \"auto\" follows the size of pixels."
+            .to_owned(),
+    );
+    line("spacing = \"auto\"".to_owned());
+    if let Radius::Spacings(radius) = loaded.settings.shading.kernel.radius {
+        line(format!("radius_in_spacings = {radius:?}"));
     }
-    line("radius_in_spacings = 2.0".to_owned());
     line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
     line(format!("resolve = \"{}\"", Resolve::Trace));
     line("\n# Indirect light: remove the # to have it.\n# [light_mesh.indirect]".to_owned());

@@ -26,6 +26,8 @@ pub struct LookupScratch {
     pub(super) points: Neighbours,
     /// Searches that surface points close together share; `None` where surface points come from anywhere.
     cells: Option<CellCache>,
+    /// Unions of neighbourhoods that were found.
+    unions: u32,
     /// Occlusion rays traced from surface points to mesh points.
     pub rays: u64,
     /// Surface points whose D_y was empty, so that the nearest mesh point took its place.
@@ -114,6 +116,41 @@ impl Lookup<'_> {
         self.around(surface, scratch.cells.as_mut()?)
     }
 
+    /// Adds the slots of all points in the neighbourhoods of some surface points to `slots`, points that lie around
+    /// several cells more than once.
+    #[inline(always)]
+    pub(super) fn union<'a>(
+        &self,
+        surfaces: impl Iterator<Item = &'a SurfacePoint>,
+        scratch: &mut LookupScratch,
+        slots: &mut Vec<u32>,
+    ) {
+        scratch.unions += 1;
+        let group = scratch.unions;
+        for surface in surfaces {
+            let mut found = 0;
+            if let Some((kernel, around)) = self.around_in(surface, scratch) {
+                for packet in around.packets {
+                    let (_, lanes) = packet.weigh(&kernel);
+                    found |= lanes;
+                    if packet.group != group {
+                        (packet.group, packet.needed) = (group, 0);
+                    }
+                    let mut new = lanes & !packet.needed;
+                    packet.needed |= lanes;
+                    while new != 0 {
+                        slots.push(packet.slots[new.trailing_zeros() as usize % crate::simd::LANES]);
+                        new &= new - 1;
+                    }
+                }
+            }
+            if found == 0 {
+                scratch.fallbacks += u64::from(self.known(surface, &mut scratch.points));
+                slots.extend_from_slice(scratch.points.slots());
+            }
+        }
+    }
+
     /// The points in the neighbourhoods of surface points, which should lie close together, known or not.
     #[inline(always)]
     pub fn needed<'a>(&self, surfaces: impl Iterator<Item = &'a SurfacePoint>) -> NeededPoints {
@@ -151,7 +188,7 @@ impl Lookup<'_> {
 mod tests {
     use super::*;
     use crate::Bounds;
-    use crate::light_mesh::points::PointSet;
+    use crate::light_mesh::points::{AutoSpacing, PointSet};
     use crate::sampling::SplitMix64;
     use crate::settings::{
         KernelSettings, Neighbourhood, PointLayout, PointSettings, Radius, Region, Spacing,
@@ -204,7 +241,8 @@ mod tests {
                     leaks: Leaks::Allow,
                 };
                 let mut points = PointSet::new(shifted);
-                let neighbourhoods = Neighbourhoods::new(&mut points, &settings, &kernel, 1.0);
+                let neighbourhoods =
+                    Neighbourhoods::new(&mut points, &settings, &kernel, AutoSpacing::AVERAGED);
                 let neighbourhoods = neighbourhoods.expect("a modest grid");
                 let mut store = PointStore::new(points);
                 let surfaces = surfaces(3000, shift);

@@ -8,5 +8,5 @@ mod visibility;
 
 pub use emissive::EmissiveTriangles;
 pub use packed::PackedLights;
-pub(crate) use packed::{IncidentLights, LightChunk};
+pub(crate) use packed::{IncidentLights, LightChunk, SurfaceLanes};
 pub(crate) use visibility::{VisibilityBits, expand_bits};

@@ -98,6 +98,12 @@ impl PackedLights {
         self.falloff
     }
 
+    /// E of one light.
+    #[inline(always)]
+    pub(crate) fn intensity(&self, index: usize, light: usize) -> [f32; 3] {
+        self.chunks[index].intensity.map(|channel| channel[light])
+    }
+
     /// Number of lights.
     pub fn len(&self) -> usize {
         self.count
@@ -115,6 +121,17 @@ fn morton(position: Vec3, bounds: crate::Bounds) -> u32 {
     let cell = ((position - bounds.min) / extent * 1023.0).as_uvec3();
     let spread = |v: u32| (0..10).fold(0, |code, bit| code | (v >> bit & 1) << (3 * bit));
     spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+}
+
+/// Sixteen surface points, by axis.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfaceLanes {
+    /// Positions.
+    pub position: [Lanes; 3],
+    /// Shading normals.
+    pub shading: [Lanes; 3],
+    /// Geometric normals.
+    pub geometric: [Lanes; 3],
 }
 
 /// Where a light coincides with the point it lights, t is raised to this, so that 0/0 can't arise.
@@ -176,6 +193,42 @@ impl PackedLights {
         }
         let [r, g, b] = &sums;
         horizontal_sums([r, g, b, &[0.0; LANES]]).truncate()
+    }
+
+    /// φ2 · cone / φ1 of one light at sixteen surface points: what [`PackedLights::irradiance`] multiplies its intensity by.
+    #[inline(always)]
+    pub(crate) fn factors(&self, index: usize, light: usize, points: &SurfaceLanes) -> Lanes {
+        with_falloff!(self.falloff, law => self.factors_with(index, light, points, law))
+    }
+
+    #[inline(always)]
+    fn factors_with(&self, index: usize, light: usize, points: &SurfaceLanes, law: impl FalloffLaw) -> Lanes {
+        let chunk = &self.chunks[index];
+        let SurfaceLanes { position: [x, y, z], shading: [nx, ny, nz], geometric: [gx, gy, gz] } = points;
+        let mut factors = [0.0f32; LANES];
+        if let Some(kinds) = &chunk.kinds {
+            for lane in 0..LANES {
+                let d = chunk.to_light(light, [x[lane], y[lane], z[lane]]);
+                let [dx, dy, dz] = d;
+                let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                let cosine = nx[lane] * dx + ny[lane] * dy + nz[lane] * dz;
+                let side = gx[lane] * dx + gy[lane] * dy + gz[lane] * dz;
+                let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                factors[lane] =
+                    lit * (kinds.cone(light, d, distance) * kinds.over_distance(light, law, distance));
+            }
+        } else {
+            let [lx, ly, lz] = [0, 1, 2].map(|axis| chunk.position[axis][light]);
+            for lane in 0..LANES {
+                let (dx, dy, dz) = (lx - x[lane], ly - y[lane], lz - z[lane]);
+                let distance = (dx * dx + dy * dy + dz * dz).sqrt().max(TINY_DISTANCE);
+                let cosine = nx[lane] * dx + ny[lane] * dy + nz[lane] * dz;
+                let side = gx[lane] * dx + gy[lane] * dy + gz[lane] * dz;
+                let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+                factors[lane] = lit * law.over_distance(distance);
+            }
+        }
+        factors
     }
 
     /// Passes every chunk to `incident`, as seen from the point `x`.

@@ -48,7 +48,7 @@ impl StopToken {
 }
 
 /// Samples per block: enough to keep all threads busy and packets full, at some 70 bytes of path each.
-const BLOCK_SAMPLES: u64 = 1 << 20;
+const BLOCK_SAMPLES: u64 = 1 << 18;
 
 /// Camera paths are kept until they are shaded up to this many samples per image, some two gigabytes; beyond, they are traced
 /// a second time, and counted twice.

@@ -5,8 +5,8 @@ use glam::Vec3;
 use crate::Bounds;
 use crate::light_mesh::direct::{DirectInterpolation, DirectMesh};
 use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
-use crate::light_mesh::points::MeshError;
-use crate::scene::Scene;
+use crate::light_mesh::points::{AutoSpacing, MeshError};
+use crate::scene::{Camera, Scene};
 use crate::settings::{
     Estimator, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve, Settings,
 };
@@ -61,6 +61,8 @@ pub struct MeshInterpolation {
     pub(super) direct_scale: f32,
     /// Whether lights on which mesh points disagree are traced.
     pub(super) hybrid: bool,
+    /// What may be wrong with a pixel that is traced in part, as a share of its light.
+    pub(super) tolerance: f32,
 }
 
 impl MeshInterpolation {
@@ -84,10 +86,19 @@ impl LightMeshes {
     pub fn interpolation(
         &mut self,
         scene: &Scene,
+        camera: &Camera,
         settings: &Settings,
     ) -> Result<MeshInterpolation, MeshError> {
         let shading = &settings.shading;
-        let direct = self.direct.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator)?;
+        let hybrid = shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight;
+        // Values that are averaged must not change their spacing within the picture, nor what indirect light is made of with the view.
+        let auto = if hybrid && settings.mesh.indirect.is_none() {
+            AutoSpacing::Pixels(camera.pixel_footprint(settings.view.resolution))
+        } else {
+            AutoSpacing::AVERAGED
+        };
+        let direct =
+            self.direct.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator, auto)?;
         let identity = IndirectIdentity::of(settings, scene);
         if self.indirect_identity != identity {
             let bounds = self.direct.store().points.bounds();
@@ -103,7 +114,8 @@ impl LightMeshes {
             direct,
             indirect,
             direct_scale: shading.direct_scale(),
-            hybrid: shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight,
+            hybrid,
+            tolerance: shading.tolerance,
         })
     }
 

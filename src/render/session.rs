@@ -159,12 +159,13 @@ fn render_world<A: Accel>(
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
     camera.validate()?;
-    render_frame(Frame::new(world, camera, &settings.view, sink, stop), settings, meshes)
+    render_frame(Frame::new(world, camera, &settings.view, sink, stop), camera, settings, meshes)
 }
 
 /// Renders with the integrator that the settings name.
 fn render_frame<A: Accel>(
     mut frame: Frame<A>,
+    camera: &Camera,
     settings: &Settings,
     meshes: &mut LightMeshes,
 ) -> Result<(Image, RenderStats), RenderError> {
@@ -177,7 +178,7 @@ fn render_frame<A: Accel>(
         }
         Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
         Integrator::LightMesh => {
-            let interpolation = meshes.interpolation(world.scene, settings)?;
+            let interpolation = meshes.interpolation(world.scene, camera, settings)?;
             let counters = &mut stats.mesh_points;
             counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);
             if let (Some(mesh), Some(view)) = (&mut meshes.indirect, &interpolation.indirect) {

@@ -4,15 +4,15 @@ use glam::Vec3;
 
 use super::trace::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{LightChunk, PackedLights, VisibilityBits, expand_bits};
+use crate::lights::{LightChunk, PackedLights, SurfaceLanes, VisibilityBits, expand_bits};
 use crate::simd::LANES;
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for
 /// neighbouring points.
 pub(super) struct SurfaceGroup {
     packet: RayPacket<LANES>,
-    /// Shading normals and geometric normals, by axis.
-    normals: [[f32; LANES]; 6],
+    /// The points themselves; rays start a little in front of them.
+    pub points: SurfaceLanes,
     used: LaneMask,
 }
 
@@ -22,7 +22,8 @@ impl SurfaceGroup {
     pub fn new(vertices: &[PathVertex]) -> Self {
         let mut packet = RayPacket::<LANES>::empty();
         packet.tnear = [0.0; LANES];
-        let mut normals = [[0.0f32; LANES]; 6];
+        let zero = [[0.0; LANES]; 3];
+        let mut points = SurfaceLanes { position: zero, shading: zero, geometric: zero };
         let mut used = 0;
         for (lane, vertex) in vertices.iter().enumerate().take(LANES) {
             let surface = &vertex.surface;
@@ -30,30 +31,43 @@ impl SurfaceGroup {
             packet.org_x[lane] = origin.x;
             packet.org_y[lane] = origin.y;
             packet.org_z[lane] = origin.z;
-            let (n, g) = (surface.shading_normal, surface.geometric_normal);
-            for (row, value) in normals.iter_mut().zip([n.x, n.y, n.z, g.x, g.y, g.z]) {
-                row[lane] = value;
+            for axis in 0..3 {
+                points.position[axis][lane] = surface.position[axis];
+                points.shading[axis][lane] = surface.shading_normal[axis];
+                points.geometric[axis][lane] = surface.geometric_normal[axis];
             }
             used |= 1 << lane;
         }
-        Self { packet, normals, used }
+        Self { packet, points, used }
     }
 
     /// Aims the rays at a light; returns the points that have it above their horizon.
     #[inline(always)]
     pub fn aim(&mut self, chunk: &LightChunk, light: usize) -> LaneMask {
-        let Self { packet, normals, .. } = self;
+        let Self { packet, points: SurfaceLanes { shading: n, geometric: g, .. }, .. } = self;
         let mut facing: LaneMask = 0;
         for lane in 0..LANES {
             let d = chunk.to_light(light, [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]]);
-            let cosine = normals[0][lane] * d[0] + normals[1][lane] * d[1] + normals[2][lane] * d[2];
-            let side = normals[3][lane] * d[0] + normals[4][lane] * d[1] + normals[5][lane] * d[2];
+            let cosine = n[0][lane] * d[0] + n[1][lane] * d[1] + n[2][lane] * d[2];
+            let side = g[0][lane] * d[0] + g[1][lane] * d[1] + g[2][lane] * d[2];
             packet.dir_x[lane] = d[0];
             packet.dir_y[lane] = d[1];
             packet.dir_z[lane] = d[2];
             facing |= LaneMask::from(cosine > 0.0 && side > 0.0) << lane;
         }
         facing & self.used
+    }
+
+    /// Copies the ray of a point, as it was aimed last, into a lane of another packet.
+    #[inline(always)]
+    pub fn copy_ray(&self, lane: usize, packet: &mut RayPacket<LANES>, to: usize) {
+        packet.org_x[to] = self.packet.org_x[lane];
+        packet.org_y[to] = self.packet.org_y[lane];
+        packet.org_z[to] = self.packet.org_z[lane];
+        packet.dir_x[to] = self.packet.dir_x[lane];
+        packet.dir_y[to] = self.packet.dir_y[lane];
+        packet.dir_z[to] = self.packet.dir_z[lane];
+        packet.tfar[to] = 1.0;
     }
 
     /// The points, of those given, that see the light aimed at: one ray each.

@@ -1,11 +1,13 @@
 //! First stage: the camera paths of a tile, steps 2 and 3 of the paper's algorithm, as a wavefront.
 
 use glam::Vec3;
+use pulp::NullaryFnOnce;
 
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene, SurfacePoint};
 use crate::settings::ViewSettings;
+use crate::simd::vectorize;
 use crate::world::World;
 
 /// A surface point on a camera path, and how much of its illumination reaches the pixel.
@@ -50,6 +52,36 @@ const MAX_PASSES: u32 = 1024;
 
 /// Traces the camera paths of a tile; what `paths` held before is gone, but its memory is used again.
 pub fn trace_paths<A: Accel>(
+    world: World<A>,
+    camera: &CameraRays,
+    view: &ViewSettings,
+    tile: &Tile,
+    paths: &mut TilePaths,
+) {
+    vectorize(TracePaths { world, camera, view, tile, paths });
+}
+
+/// The camera paths of a tile, as work for the best instruction set.
+struct TracePaths<'a, A> {
+    world: World<'a, A>,
+    camera: &'a CameraRays,
+    view: &'a ViewSettings,
+    tile: &'a Tile,
+    paths: &'a mut TilePaths,
+}
+
+impl<A: Accel> NullaryFnOnce for TracePaths<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { world, camera, view, tile, paths } = self;
+        trace_tile(world, camera, view, tile, paths);
+    }
+}
+
+#[inline(always)]
+fn trace_tile<A: Accel>(
     world: World<A>,
     camera: &CameraRays,
     view: &ViewSettings,

@@ -17,6 +17,15 @@ pub struct Camera {
     pub vertical_fov: f32,
 }
 
+/// How large pixels are where a view's camera rays end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelFootprint {
+    /// Where the rays start.
+    pub eye: Vec3,
+    /// Edge of a pixel at distance 1 from there, in the middle of the image.
+    pub edge: f32,
+}
+
 /// A camera that shows nothing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{} {}", self.field(), self.problem())]
@@ -62,6 +71,12 @@ impl Camera {
     /// A camera at `position` with `target` in the middle of its image; y is up, and 45° are in view.
     pub fn look_at(position: Vec3, target: Vec3) -> Self {
         Self { name: String::new(), position, look_at: target, up: Vec3::Y, vertical_fov: 45.0 }
+    }
+
+    /// How large the pixels of an image of this resolution are.
+    pub fn pixel_footprint(&self, resolution: (u32, u32)) -> PixelFootprint {
+        let edge = 2.0 * (self.vertical_fov.to_radians() * 0.5).tan() / resolution.1 as f32;
+        PixelFootprint { eye: self.position, edge }
     }
 
     /// The camera with another vertical field of view, degrees.

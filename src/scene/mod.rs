@@ -16,7 +16,7 @@ mod texture;
 mod validate;
 
 pub use alpha_mask::AlphaMask;
-pub use camera::{Camera, CameraError};
+pub use camera::{Camera, CameraError, PixelFootprint};
 pub use camera_rays::CameraRays;
 pub use light::{Falloff, Light, LightKind};
 pub(crate) use masked_mesh::{AlphaMasks, MaskedMesh};

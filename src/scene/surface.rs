@@ -70,6 +70,7 @@ const OFFSET_FACTOR: f32 = 32.0 * f32::EPSILON;
 
 impl Scene {
     /// Surface point and material of a hit, seen along `direction` (any length).
+    #[inline(always)]
     pub fn interaction(&self, hit: &Hit, direction: Vec3) -> Interaction {
         let instance = &self.instances[hit.instance as usize];
         let mesh = &*self.meshes[instance.mesh as usize];
@@ -145,12 +146,14 @@ impl Scene {
 }
 
 /// Upper bound of how much a matrix stretches a vector's largest component.
+#[inline(always)]
 fn max_scale(matrix: &Mat3A) -> f32 {
     let sum = matrix.x_axis.abs() + matrix.y_axis.abs() + matrix.z_axis.abs();
     sum.max_element()
 }
 
 /// Cofactor matrix: the inverse transpose times the determinant.
+#[inline(always)]
 fn cofactors(m: &Mat3A) -> Mat3A {
     Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }

@@ -72,6 +72,7 @@ impl Texture {
         sums.map(|sum| (sum as f64 / (255.0 * self.texels.len() as f64)) as f32)
     }
 
+    #[inline(always)]
     fn texel(&self, x: u32, y: u32) -> [u8; 4] {
         self.texels[(y * self.width + x) as usize]
     }
@@ -79,6 +80,7 @@ impl Texture {
 
 impl Wrap {
     /// Texel number of a column or row that may lie outside of `count`.
+    #[inline(always)]
     fn texel(self, at: i64, count: u32) -> u32 {
         let count = i64::from(count);
         let within = match self {
@@ -95,6 +97,7 @@ impl Wrap {
 
 impl TextureMap {
     /// Linear RGB and coverage at texture coordinates, interpolated between the four nearest texels.
+    #[inline(always)]
     pub fn sample(&self, uv: Vec2) -> (Vec3, f32) {
         let Texture { width, height, .. } = *self.texture;
         let at = self.transform.transform_point2(uv) * Vec2::new(width as f32, height as f32) - 0.5;
@@ -117,6 +120,7 @@ impl TextureMap {
 }
 
 /// Linear light of an 8-bit sRGB value.
+#[inline(always)]
 fn linear(encoded: u8) -> f32 {
     static TABLE: std::sync::LazyLock<[f32; 256]> =
         std::sync::LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)));

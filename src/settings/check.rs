@@ -51,6 +51,8 @@ impl Settings {
         one_or_more("shading.reference_samples", shading.reference_samples)?;
         let threshold = view.weight_threshold;
         check("view.weight_threshold", "be a number from 0 up", threshold, threshold >= 0.0)?;
+        let tolerance = shading.tolerance;
+        check("shading.tolerance", "be a number from 0 up", tolerance, tolerance >= 0.0)?;
         let radius = |name, radius: Radius| {
             let (Radius::Units(length) | Radius::Spacings(length)) = radius;
             check(name, "be finite and above 0", length, is_length(length))

@@ -16,6 +16,8 @@ pub struct ShadingSettings {
     pub estimator: Estimator,
     /// With [`Estimator::PerLight`]: what happens to lights on which the points of D_y disagree.
     pub resolve: Resolve,
+    /// With [`Resolve::Trace`]: what all decisions not to trace a ray may cost, as a share of a pixel's light, from 0 up.
+    pub tolerance: f32,
     /// D_y in the direct mesh.
     pub kernel: KernelSettings,
     /// How indirect light follows from the indirect mesh, if there is one.
@@ -30,6 +32,7 @@ impl Default for ShadingSettings {
             lambertian: false,
             estimator: Estimator::PerLight,
             resolve: Resolve::Average,
+            tolerance: 0.01,
             kernel: KernelSettings::default(),
             indirect: IndirectShading::default(),
         }

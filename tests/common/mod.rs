@@ -15,6 +15,7 @@ use lightmesh::accel::{Backend, BackendChoice, BvhAccel};
 use lightmesh::image::Image;
 use lightmesh::light_mesh::direct::DirectMesh;
 use lightmesh::light_mesh::lookup::LookupScratch;
+use lightmesh::light_mesh::points::AutoSpacing;
 use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::render::{RenderStats, Session, render};
 use lightmesh::scene::generate::forest::Forest;
@@ -144,7 +145,12 @@ pub fn direct_illumination(scene: &Scene, settings: &Settings, surfaces: &[Surfa
     with_world(scene, |world| {
         let mut mesh = DirectMesh::new(scene.bounds());
         let shading = &settings.shading;
-        let shading = mesh.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator);
+        let shading = mesh.interpolation(
+            &settings.mesh.direct,
+            &shading.kernel,
+            shading.estimator,
+            AutoSpacing::AVERAGED,
+        );
         let shading = shading.expect("a light mesh");
         let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
         mesh.evaluate(world, &shading, &needed);

@@ -8,6 +8,7 @@ use lightmesh::World;
 use lightmesh::accel::{Accel, BvhAccel, Coherence, LaneMask, RayHitPacket, RayPacket};
 use lightmesh::light_mesh::direct::DirectMesh;
 use lightmesh::light_mesh::indirect::{DirectTransport, IndirectMesh};
+use lightmesh::light_mesh::points::AutoSpacing;
 use lightmesh::lights::{EmissiveTriangles, PackedLights};
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::scene::{Camera, Hit, Ray, SurfacePoint};
@@ -118,7 +119,9 @@ fn no_occlusion_ray_is_traced_twice() {
     let world = World { accel: &witness, scene, lights: &lights, emissive: &emissive };
     let mut direct = DirectMesh::new(scene.bounds());
     let Settings { mesh, shading, .. } = &settings;
-    let reading = direct.interpolation(&mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let reading = direct
+        .interpolation(&mesh.direct, &shading.kernel, shading.estimator, AutoSpacing::AVERAGED)
+        .unwrap();
     let mut indirect = IndirectMesh::new(scene.bounds(), mesh.indirect.as_ref().unwrap());
     let reading_indirect = indirect.interpolation(&shading.indirect).unwrap();
     let (mut rays, mut evaluated) = (0, 0);

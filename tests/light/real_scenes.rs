@@ -9,7 +9,7 @@ use lightmesh::accel::{Accel, Backend};
 use lightmesh::image::Image;
 use lightmesh::image::tone::auto_exposure;
 use lightmesh::light_mesh::direct::DirectMesh;
-use lightmesh::light_mesh::points::Neighbours;
+use lightmesh::light_mesh::points::{AutoSpacing, Neighbours};
 use lightmesh::scene::load::{LoadedScene, open_scene};
 use lightmesh::scene::{CameraRays, Interaction, Light, Ray, Scene};
 use lightmesh::settings::{Resolve, Settings, Spacing};
@@ -97,7 +97,9 @@ fn check_bounds(
     let scene = &loaded.scene;
     let mut mesh = DirectMesh::new(scene.bounds());
     let shading = &settings.shading;
-    let shading = mesh.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator).unwrap();
+    let shading = mesh
+        .interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator, AutoSpacing::AVERAGED)
+        .unwrap();
     let points = &mesh.store().points;
     let mut neighbours = Neighbours::default();
     let (mut checked, mut agreeing) = (0, 0);

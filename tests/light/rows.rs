@@ -5,6 +5,7 @@ use lightmesh::World;
 use lightmesh::accel::BvhAccel;
 use lightmesh::light_mesh::direct::DirectMesh;
 use lightmesh::light_mesh::lookup::LookupScratch;
+use lightmesh::light_mesh::points::AutoSpacing;
 use lightmesh::scene::SurfacePoint;
 use lightmesh::settings::{Estimator, KernelSettings, Leaks, Neighbourhood, PointSettings, Spacing};
 
@@ -39,7 +40,7 @@ fn compare_rows(world: World<BvhAccel>, surfaces: &[SurfacePoint]) {
                 let points = PointSettings { spacing, ..PointSettings::default() };
                 let kernel = KernelSettings { leaks, neighbourhood, ..KernelSettings::default() };
                 let mut mesh = DirectMesh::new(world.scene.bounds());
-                let shading = mesh.interpolation(&points, &kernel, estimator).unwrap();
+                let shading = mesh.interpolation(&points, &kernel, estimator, AutoSpacing::AVERAGED).unwrap();
                 let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
                 mesh.evaluate(world, &shading, &needed);
                 let view = mesh.view(world.lights, &shading);

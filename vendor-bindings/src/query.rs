@@ -289,7 +289,10 @@ impl Scene {
     ) -> u32 {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
         let lanes = Valid::new(active, packet, self.largest_coordinate());
-        if N == 16 && self.is_native(8) && (!self.is_native(16) || coherent && matches!(self.api(), Api::V3(_))) {
+        if N == 16
+            && self.is_native(8)
+            && (!self.is_native(16) || coherent && matches!(self.api(), Api::V3(_)))
+        {
             // Processors with AVX2 and no AVX-512 have packets of 8. Where there are such of 16, Debian's 3.13.5 never
             // returns from some coherent occlusion queries: its AVX-512 code stores 16 bits of a lane mask and
             // reads back 64. Two coherent packets of 8 are faster than an incoherent one of 16.
@@ -348,7 +351,8 @@ impl Scene {
                 continue;
             }
             let eight = first..first + 8;
-            let mut half = RayHitPacket { ray: half_of(&packet.ray, first), hit: RayHitPacket::<8>::empty().hit };
+            let mut half =
+                RayHitPacket { ray: half_of(&packet.ray, first), hit: RayHitPacket::<8>::empty().hit };
             self.intersect_packet(lanes, &mut half, coherent);
             packet.ray.tfar[eight.clone()].copy_from_slice(&half.ray.tfar);
             let (from, to) = (&half.hit, &mut packet.hit);

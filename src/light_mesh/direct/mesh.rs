@@ -10,10 +10,10 @@ use crate::Bounds;
 use crate::accel::Accel;
 use crate::light_mesh::leaks::amounts_differ;
 use crate::light_mesh::lookup::{Lookup, LookupScratch};
-use crate::light_mesh::points::{MeshError, Neighbourhoods, PointPacket, PointSet};
+use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointPacket, PointSet};
 use crate::light_mesh::slot::UNKNOWN;
 use crate::light_mesh::store::{PointMask, PointStore};
-use crate::lights::{PackedLights, VisibilityBits};
+use crate::lights::PackedLights;
 use crate::scene::SurfacePoint;
 use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
 use crate::simd::{LANES, horizontal_extremes, horizontal_sums};
@@ -63,7 +63,8 @@ impl DirectMesh {
         Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
     }
 
-    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh.
+    /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh. An automatic
+    /// spacing follows from `auto`.
     ///
     /// # Errors
     /// See [`MeshError`].
@@ -72,9 +73,10 @@ impl DirectMesh {
         points: &PointSettings,
         kernel: &KernelSettings,
         estimator: Estimator,
+        auto: AutoSpacing,
     ) -> Result<DirectInterpolation, MeshError> {
         let set = &mut self.store.points;
-        let neighbourhoods = Neighbourhoods::new(set, points, kernel, Neighbourhoods::AUTO_SPACINGS)?;
+        let neighbourhoods = Neighbourhoods::new(set, points, kernel, auto)?;
         Ok(DirectInterpolation { neighbourhoods, leaks: kernel.leaks, estimator })
     }
 
@@ -229,32 +231,5 @@ impl DirectView<'_> {
             (0..3).for_each(|channel| packet.lit[channel][lane] = light[channel]);
             packet.amount[lane] = self.estimator.field.amount(Basis::Irradiance, slot);
         }
-    }
-
-    /// Classifies the lights by D_y: per chunk those that all of its points see (`seen`), and those on which they disagree
-    /// (`uncertain`).
-    #[inline(always)]
-    pub(crate) fn classify<A: Accel>(
-        &self,
-        accel: &A,
-        surface: &SurfacePoint,
-        scratch: &mut LookupScratch,
-        seen: &mut [VisibilityBits],
-        uncertain: &mut [VisibilityBits],
-    ) {
-        // Where the points disagree, rays to the lights themselves decide: fewer points would only hide it.
-        self.lookup.find(accel, surface, scratch, |_| false);
-        let FieldEstimator { field, lights, .. } = self.estimator;
-        let chunks = lights.chunks().len();
-        seen.fill(VisibilityBits::MAX);
-        uncertain.fill(0);
-        for &slot in scratch.points.slots() {
-            let bits = field.bits(slot, chunks);
-            for ((all, any), bits) in seen.iter_mut().zip(&mut *uncertain).zip(bits) {
-                *all &= bits;
-                *any |= bits;
-            }
-        }
-        uncertain.iter_mut().zip(seen).for_each(|(any, all)| *any &= !*all);
     }
 }

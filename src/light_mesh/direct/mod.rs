@@ -8,9 +8,11 @@ mod mesh;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod spherical_harmonics;
+mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};
+pub(crate) use witnesses::Witnesses;
 
 // For tests and benches only.
 #[doc(hidden)]

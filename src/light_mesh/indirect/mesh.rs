@@ -3,7 +3,7 @@
 use super::interpolation::IndirectInterpolation;
 use super::octahedral::ENTRIES;
 use crate::Bounds;
-use crate::light_mesh::points::{MeshError, Neighbourhoods, PointSet};
+use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointSet};
 use crate::light_mesh::store::PointStore;
 use crate::sampling::SphereStrata;
 use crate::settings::{IndirectForm, IndirectSettings, IndirectShading};
@@ -37,7 +37,7 @@ impl IndirectMesh {
             &mut self.store.points,
             &self.settings.points,
             &shading.kernel,
-            Neighbourhoods::AUTO_SPACINGS / IndirectSettings::COARSENESS,
+            AutoSpacing::GATHERED,
         )?;
         Ok(IndirectInterpolation { neighbourhoods, shading: shading.clone() })
     }

@@ -26,6 +26,8 @@ pub struct PointPacket {
     pub slots: [u32; LANES],
     /// Lanes whose points lay in the kernel of some surface point.
     pub needed: u16,
+    /// For whose surface points `needed` is.
+    pub group: u32,
     /// Irradiance of the points for one normal, [`Surroundings::normal`], by channel.
     pub lit: [Lanes; 3],
     /// Amount of light at the points, summed over channels and directions; below 0 at points that don't count.
@@ -39,6 +41,7 @@ impl PointPacket {
         ids: [0; LANES],
         slots: [UNKNOWN; LANES],
         needed: 0,
+        group: 0,
         lit: [[0.0; LANES]; 3],
         amount: [0.0; LANES],
     };

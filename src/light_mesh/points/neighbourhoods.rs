@@ -7,8 +7,8 @@ use super::kernel::Kernel;
 use super::neighbours::Neighbours;
 use super::point_set::{MeshError, PointSet};
 use crate::Bounds;
-use crate::scene::SurfacePoint;
-use crate::settings::{KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
+use crate::scene::{PixelFootprint, SurfacePoint};
+use crate::settings::{IndirectSettings, KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
 
 /// A part of space with points and a radius of its own.
 struct Zone {
@@ -33,18 +33,17 @@ const FARTHEST_CELL: f32 = (1 << 20) as f32;
 
 /// Which layer of points and which kernel a surface point takes.
 pub struct Neighbourhoods {
-    /// The whole scene first, then the regions: the last one that holds y decides.
+    /// The whole scene first, then its rings around the eye, then the regions: the last one that holds y decides.
     zones: Vec<Zone>,
+    eye: Vec3,
+    /// Squared distances from the eye at which rings begin, in ascending order.
+    rings: Vec<f32>,
     neighbourhood: Neighbourhood,
     hemisphere: bool,
 }
 
 impl Neighbourhoods {
-    /// With `spacing = "auto"` the scene's diagonal is this many spacings of direct mesh points long.
-    pub(crate) const AUTO_SPACINGS: f32 = 120.0;
-
-    /// Adds the layers that the settings name to `points`. An automatic spacing is the scene's diagonal over
-    /// `auto_spacings`.
+    /// Adds the layers that the settings name to `points`; `auto` says what an automatic spacing follows from.
     ///
     /// # Errors
     /// See [`MeshError`].
@@ -52,15 +51,23 @@ impl Neighbourhoods {
         points: &mut PointSet,
         settings: &PointSettings,
         kernel: &KernelSettings,
-        auto_spacings: f32,
+        auto: AutoSpacing,
     ) -> Result<Self, MeshError> {
         let bounds = points.bounds();
-        let spacing = match settings.spacing {
-            Spacing::Units(spacing) => spacing,
-            Spacing::Auto => {
-                let diagonal = bounds.extent().length();
-                Vec3::splat(if diagonal > 0.0 { diagonal / auto_spacings } else { 1.0 })
+        let diagonal = bounds.extent().length();
+        let (mut levels, mut eye, mut rings) = (Vec::new(), Vec3::ZERO, Vec::new());
+        let spacing = match (settings.spacing, auto) {
+            (Spacing::Units(spacing), _) => spacing,
+            (Spacing::Auto, AutoSpacing::Pixels(footprint)) if diagonal > 0.0 => {
+                eye = footprint.eye;
+                levels = ring_levels(bounds, footprint);
+                rings = levels.iter().skip(1).map(|level| level.begin * level.begin).collect();
+                Vec3::splat(levels.first().map_or(diagonal, |level| level.spacing))
             }
+            (Spacing::Auto, AutoSpacing::Scene { spacings }) if diagonal > 0.0 => {
+                Vec3::splat(diagonal / spacings)
+            }
+            _ => Vec3::ONE,
         };
         let radius_for = |spacing: Vec3| match kernel.radius {
             Radius::Units(radius) => radius,
@@ -71,28 +78,49 @@ impl Neighbourhoods {
             Ok(Zone::new(bounds, region, kernel.neighbourhood, layer, radius))
         };
         let mut zones = vec![zone(None, spacing, radius_for(spacing))?];
+        for level in levels.iter().skip(1) {
+            let spacing = Vec3::splat(level.spacing);
+            zones.push(zone(None, spacing, radius_for(spacing))?);
+        }
         for region in &settings.regions {
             let spacing = region.spacing.unwrap_or(spacing);
             let radius = region.radius.unwrap_or_else(|| radius_for(spacing));
             zones.push(zone(Some(region.bounds), spacing, radius)?);
         }
-        Ok(Self { zones, neighbourhood: kernel.neighbourhood, hemisphere: kernel.hemisphere })
+        Ok(Self { zones, eye, rings, neighbourhood: kernel.neighbourhood, hemisphere: kernel.hemisphere })
     }
 
     /// About how many points the neighbourhoods of surface points can reach.
     pub(crate) fn count(&self, points: &PointSet) -> u64 {
         let bounds = points.bounds();
-        let count = |zone: &Zone| {
-            let of = zone.bounds.unwrap_or(bounds);
+        let reach = |of: Bounds, zone: &Zone| {
             points.count_in(zone.layer, Bounds { min: of.min - zone.radius, max: of.max + zone.radius })
         };
-        if bounds.is_empty() { 0 } else { self.zones.iter().map(count).sum() }
+        // The part of the scene in a box around the ball of a radius.
+        let within = |squared: f32| Bounds {
+            min: bounds.min.max(self.eye - squared.sqrt()),
+            max: bounds.max.min(self.eye + squared.sqrt()),
+        };
+        let count = |(number, zone): (usize, &Zone)| {
+            if number > self.rings.len() || self.rings.is_empty() {
+                return reach(zone.bounds.unwrap_or(bounds), zone);
+            }
+            let outer = self.rings.get(number).map_or(bounds, |end| within(*end));
+            let inner = number.checked_sub(1).and_then(|inner| self.rings.get(inner));
+            let count = |of: Bounds| if of.is_empty() { 0 } else { reach(of, zone) };
+            count(outer).saturating_sub(inner.map_or(0, |begin| count(within(*begin))))
+        };
+        if bounds.is_empty() { 0 } else { self.zones.iter().enumerate().map(count).sum() }
     }
 
     #[inline(always)]
     fn zone_number_at(&self, y: Vec3) -> usize {
         let mut found = 0;
-        for (number, zone) in self.zones.iter().enumerate().skip(1) {
+        if !self.rings.is_empty() {
+            let distance = y.distance_squared(self.eye);
+            found = self.rings.iter().take_while(|begin| distance >= **begin).count();
+        }
+        for (number, zone) in self.zones.iter().enumerate().skip(1 + self.rings.len()) {
             if zone.bounds.is_some_and(|bounds| bounds.contains(y)) {
                 found = number;
             }
@@ -156,6 +184,53 @@ impl Neighbourhoods {
         let around = cells.around(cell, surround, forget);
         Some((self.kernel_in(zone, surface), around))
     }
+}
+
+/// What an automatic spacing follows from.
+#[derive(Clone, Copy, Debug)]
+pub enum AutoSpacing {
+    /// The scene's size: its diagonal is this many spacings long.
+    Scene {
+        /// See above.
+        spacings: f32,
+    },
+    /// The size of a view's pixels where it ends.
+    Pixels(PixelFootprint),
+}
+
+impl AutoSpacing {
+    /// What direct mesh points take whose values are averaged.
+    pub const AVERAGED: Self = Self::Scene { spacings: 120.0 };
+    /// What indirect mesh points take.
+    pub const GATHERED: Self = Self::Scene { spacings: 120.0 / IndirectSettings::COARSENESS };
+}
+
+/// A part of space around the eye with mesh points of one spacing.
+struct RingLevel {
+    spacing: f32,
+    /// Distance from the eye at which it begins.
+    begin: f32,
+}
+
+/// Mesh points are at most this many pixels apart, and at least half as many.
+const PIXELS: f32 = 40.0;
+/// A scene's diagonal is at least so many spacings long, and at most.
+const SPACINGS: [f32; 2] = [16.0, 4096.0];
+
+/// The spacings of a view, nearest first. They are powers of 2, so that views share mesh points.
+fn ring_levels(bounds: Bounds, footprint: PixelFootprint) -> Vec<RingLevel> {
+    let per_distance = PIXELS * footprint.edge;
+    let diagonal = bounds.extent().length();
+    let farthest = (bounds.min - footprint.eye).abs().max((bounds.max - footprint.eye).abs()).length();
+    let exponent = |spacing: f32| spacing.log2().floor() as i32;
+    let last = exponent((farthest * per_distance).min(diagonal / SPACINGS[0]));
+    let first = exponent(diagonal / SPACINGS[1]).min(last);
+    (first..=last)
+        .map(|exponent| {
+            let spacing = (exponent as f32).exp2();
+            RingLevel { spacing, begin: spacing / per_distance }
+        })
+        .collect()
 }
 
 impl Zone {

@@ -45,7 +45,8 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
         if interpolation.hybrid {
-            counters.shadow_rays = shade_hybrid(accel, direct, tile, vertices, &mut scratch, light);
+            counters.shadow_rays =
+                shade_hybrid(accel, direct, interpolation.tolerance, tile, vertices, &mut scratch, light);
         } else {
             let mut before = Vec3::NAN;
             for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {
@@ -82,7 +83,8 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         let Self { world, meshes, interpolation } = self;
         let mut seconds = stats.seconds.mesh;
         timed(&mut seconds, || {
-            let needed = needed_points(paths, meshes.direct.view(world.lights, &interpolation.direct).lookup);
+            let lookup = meshes.direct.view(world.lights, &interpolation.direct).lookup;
+            let needed = needed_points(paths, lookup);
             stats.mesh_points.direct.needed += needed.len();
             stats.add_direct(meshes.direct.evaluate(*world, &interpolation.direct, &needed));
         });

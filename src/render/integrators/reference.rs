@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::{Basis, DirectField, FieldEstimator};
 use crate::light_mesh::leaks::{LeakGuard, PROBES, is_inside};
-use crate::light_mesh::points::{Kernel, MeshError, Neighbourhoods, Neighbours, PointSet};
+use crate::light_mesh::points::{AutoSpacing, Kernel, MeshError, Neighbourhoods, Neighbours, PointSet};
 use crate::render::frame::BlockIntegrator;
 use crate::render::stats::{RenderStats, ShadeCounters};
 use crate::render::tiles::Tile;
@@ -55,12 +55,8 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
     pub fn new(world: World<'a, A>, settings: &'a Settings) -> Result<Self, MeshError> {
         let shading = &settings.shading;
         let mut points = PointSet::new(world.scene.bounds());
-        let neighbourhoods = Neighbourhoods::new(
-            &mut points,
-            &settings.mesh.direct,
-            &shading.kernel,
-            Neighbourhoods::AUTO_SPACINGS,
-        )?;
+        let neighbourhoods =
+            Neighbourhoods::new(&mut points, &settings.mesh.direct, &shading.kernel, AutoSpacing::AVERAGED)?;
         let sequence = (0..shading.reference_samples).map(unit_cube_point).collect();
         Ok(Self { world, shading, neighbourhoods, sequence })
     }

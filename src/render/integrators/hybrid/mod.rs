@@ -1,0 +1,53 @@
+//! Hybrid shadows (method §4): the mesh says which lights a place sees, which not, and which are open; rays answer what is
+//! open, and look for where the mesh is wrong.
+//!
+//! A tile is shaded in two passes. [`prior`](prior::Prior) goes from patch to patch, a patch being up to 16 surface points of one
+//! square of pixels, and sorts the lights by what the mesh points around it see. [`trace`](trace::LightTracer) then
+//! goes from light to light and traces, for the whole tile at once, what has to be.
+
+mod patch;
+mod prior;
+mod trace;
+
+use glam::Vec3;
+
+use crate::accel::Accel;
+use crate::light_mesh::direct::DirectView;
+use crate::light_mesh::lookup::LookupScratch;
+use crate::render::tiles::Tile;
+use crate::render::trace::PathVertex;
+
+use patch::Patch;
+use prior::Prior;
+use trace::LightTracer;
+
+/// Shades surface points of a tile: fills `light` with the I of each; returns the number of rays traced towards lights.
+#[inline(always)]
+pub(super) fn shade_hybrid<A: Accel>(
+    accel: &A,
+    mesh: DirectView,
+    tolerance: f32,
+    tile: &Tile,
+    vertices: &[PathVertex],
+    scratch: &mut LookupScratch,
+    light: &mut [Vec3],
+) -> u64 {
+    let lights = mesh.estimator.lights;
+    if lights.is_empty() || vertices.is_empty() {
+        return 0;
+    }
+    let mut patches = Patch::cut(tile, vertices);
+    let mut prior = Prior::new(mesh, tolerance);
+    for patch in &mut patches {
+        prior.add(patch, vertices, scratch);
+    }
+    let rays = LightTracer::new(accel, lights, tile, &mut patches, &prior).trace(vertices);
+    for patch in &patches {
+        let points = &mut light[patch.vertices.clone()];
+        for (lane, light) in points.iter_mut().enumerate() {
+            // What was taken for lit and then found dark leaves a rounding error.
+            *light = Vec3::from(patch.light.map(|channel| channel[lane])).max(Vec3::ZERO);
+        }
+    }
+    rays
+}

@@ -1,0 +1,288 @@
+//! Which rays towards a light are traced in a tile.
+
+use glam::Vec3;
+
+use super::patch::Patch;
+use super::prior::{Assumption, Prior, add_light};
+use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
+use crate::lights::{IncidentLights, PackedLights};
+use crate::render::tiles::{TILE, Tile};
+use crate::render::trace::PathVertex;
+use crate::simd::{LANES, Lanes};
+
+/// Rays per patch that check what is assumed, all lights together. They are shared among the lights in proportion to what each
+/// would give the tile if nothing stood in its way; a patch gets at most one per light.
+const CHECKS: f32 = 16.0;
+
+/// Places of a tile at which the strength of its lights is found.
+const PLACES: usize = 8;
+
+/// Share of a light's strength that doesn't follow the cosine: what a normal at one place hides, others may see.
+const ANY_NORMAL: f32 = 0.1;
+
+/// What is known of the light in one patch.
+#[derive(Clone, Copy, Default)]
+struct View {
+    /// Points that have the light above their horizon.
+    facing: LaneMask,
+    /// Points whose ray was traced.
+    traced: LaneMask,
+    /// Those of them that see the light.
+    seeing: LaneMask,
+    /// Points whose rays are to be traced next.
+    wanted: LaneMask,
+    /// What is assumed of the points that aren't traced; an open patch has `None` until its corners agree.
+    assumed: Option<bool>,
+    /// Whether `facing` is known.
+    aimed: bool,
+}
+
+impl View {
+    /// The points that see the light, as far as is known.
+    fn lit(&self) -> LaneMask {
+        let assumed = if self.assumed == Some(true) { !self.traced } else { 0 };
+        self.facing & (self.seeing | assumed)
+    }
+}
+
+/// Traces rays towards the lights of a tile.
+pub struct LightTracer<'a, A> {
+    accel: &'a A,
+    lights: &'a PackedLights,
+    tile: &'a Tile,
+    patches: &'a mut [Patch],
+    prior: &'a Prior<'a>,
+    views: Vec<View>,
+    /// The patches along a Morton curve, so that those that follow each other are neighbours.
+    order: Vec<u32>,
+    /// Rays under way: patch and lane of each.
+    batch: Vec<(u32, u32)>,
+    rays: u64,
+}
+
+impl<'a, A: Accel> LightTracer<'a, A> {
+    pub fn new(
+        accel: &'a A,
+        lights: &'a PackedLights,
+        tile: &'a Tile,
+        patches: &'a mut [Patch],
+        prior: &'a Prior<'a>,
+    ) -> Self {
+        let views = vec![View::default(); patches.len()];
+        let mut order: Vec<u32> = (0..patches.len() as u32).collect();
+        order.sort_by_key(|&number| morton(patches[number as usize].square));
+        Self { accel, lights, tile, patches, prior, views, order, batch: Vec::new(), rays: 0 }
+    }
+
+    /// Traces what has to be for all lights, and adds what it changes to the patches' light; returns the number of rays.
+    #[inline(always)]
+    pub fn trace(mut self, vertices: &[PathVertex]) -> u64 {
+        let strengths = strengths(self.lights, vertices);
+        let total: f32 = strengths.as_flattened().iter().sum();
+        let per_strength = CHECKS * self.patches.len() as f32 / total.max(f32::MIN_POSITIVE);
+        for (index, chunk) in self.lights.chunks().iter().enumerate() {
+            for light in 0..chunk.used.count_ones() as usize {
+                let hash = self.hash(index * LANES + light);
+                // Rounded up or down at random.
+                let expected = strengths[index][light] * per_strength;
+                let checks = (expected + (hash >> 8) as f32 / (1 << 24) as f32) as usize;
+                if checks > 0 || self.prior.is_open(index, light) {
+                    self.trace_light(index, light, checks.min(self.patches.len()), hash as usize);
+                }
+            }
+        }
+        self.rays
+    }
+
+    /// A number without pattern for a light of this tile.
+    fn hash(&self, light: usize) -> u32 {
+        let Tile { x, y, .. } = self.tile;
+        let mixed = [x / TILE, y / TILE, light as u32]
+            .iter()
+            .fold(0x9E37_79B9u32, |hash, value| (hash ^ value).wrapping_mul(0x85EB_CA6B).rotate_left(13));
+        (mixed ^ mixed >> 15).wrapping_mul(0xC2B2_AE35)
+    }
+
+    #[inline(always)]
+    fn trace_light(&mut self, index: usize, light: usize, checks: usize, hash: usize) {
+        for (number, view) in self.views.iter_mut().enumerate() {
+            let assumed = match self.prior.assumption(number, index, light) {
+                Assumption::Lit => Some(true),
+                Assumption::Dark | Assumption::Weak => Some(false),
+                Assumption::Open => None,
+            };
+            *view = View { assumed, ..View::default() };
+            if assumed.is_none() {
+                aim(view, &mut self.patches[number], self.lights, index, light);
+                view.wanted = view.facing & self.patches[number].probes;
+                if view.wanted == 0 {
+                    view.wanted = view.facing;
+                }
+            }
+        }
+        let count = self.patches.len();
+        for check in 0..checks {
+            let number = (hash + check * count / checks) % count;
+            if self.prior.assumption(number, index, light) == Assumption::Weak {
+                continue;
+            }
+            let view = &mut self.views[number];
+            aim(view, &mut self.patches[number], self.lights, index, light);
+            view.wanted |= any_of(view.facing & !view.wanted, hash / 7 + number * 7);
+        }
+        while self.trace_wanted() {
+            self.judge(index, light);
+        }
+        for (number, (view, patch)) in self.views.iter().zip(&mut *self.patches).enumerate() {
+            let added = match self.prior.assumption(number, index, light) {
+                Assumption::Lit => view.facing & !view.lit(),
+                Assumption::Weak => 0,
+                _ => view.lit(),
+            };
+            if added != 0 {
+                let sign =
+                    if self.prior.assumption(number, index, light) == Assumption::Lit { -1.0 } else { 1.0 };
+                let factors = self.lights.factors(index, light, &patch.group.points);
+                let factors: Lanes =
+                    std::array::from_fn(|lane| factors[lane] * sign * (added >> lane & 1) as f32);
+                add_light(&mut patch.light, self.lights.intensity(index, light), &factors);
+            }
+        }
+    }
+
+    /// Traces the wanted rays; returns whether there were any.
+    #[inline(always)]
+    fn trace_wanted(&mut self) -> bool {
+        self.batch.clear();
+        for &number in &self.order {
+            let view = &mut self.views[number as usize];
+            let mut lanes = view.wanted;
+            while lanes != 0 {
+                self.batch.push((number, lanes.trailing_zeros()));
+                lanes &= lanes - 1;
+            }
+            view.traced |= view.wanted;
+        }
+        self.rays += self.batch.len() as u64;
+        for batch in self.batch.chunks(LANES) {
+            let mut packet = RayPacket::<LANES>::empty();
+            for (to, &(number, lane)) in batch.iter().enumerate() {
+                self.patches[number as usize].group.copy_ray(lane as usize, &mut packet, to);
+            }
+            let active = ((1u64 << batch.len()) - 1) as LaneMask;
+            let blocked = self.accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+            for (from, &(number, lane)) in batch.iter().enumerate() {
+                self.views[number as usize].seeing |= (!blocked >> from & 1) << lane;
+            }
+        }
+        !self.batch.is_empty()
+    }
+
+    /// Decides what the rays that were traced last ask for.
+    ///
+    /// - Probes of an open patch that agree stand for all of its points.
+    /// - Where a ray contradicts what was assumed, the patch's corners are asked; if they all contradict, the assumption is
+    ///   turned round.
+    /// - Where rays disagree, all of the patch is traced.
+    /// - In both cases an edge may lie in the neighbours too, and their corners are traced. If the patch's own
+    ///   corners agree, so that what was found lies between them, it is thin, and the neighbours are traced as a whole.
+    #[inline(always)]
+    fn judge(&mut self, index: usize, light: usize) {
+        let (mut near_edges, mut near_thin) = (0, 0);
+        for (view, patch) in self.views.iter_mut().zip(&*self.patches) {
+            if std::mem::take(&mut view.wanted) == 0 {
+                continue;
+            }
+            let dark = view.traced & !view.seeing;
+            let (any_lit, any_dark) = (view.seeing != 0, dark != 0);
+            let corners = patch.corners & view.facing;
+            if any_lit != any_dark && view.assumed.is_none_or(|assumed| assumed == any_lit) {
+                view.assumed = Some(any_lit);
+            } else if any_lit != any_dark && corners & !view.traced != 0 {
+                view.wanted = corners & !view.traced;
+            } else if any_lit != any_dark {
+                view.assumed = Some(any_lit);
+                near_edges |= patch.square_bit();
+            } else if view.traced != view.facing {
+                view.wanted = view.facing & !view.traced;
+            } else if corners & dark != 0 && corners & view.seeing != 0 {
+                near_edges |= patch.square_bit();
+            } else {
+                near_thin |= patch.square_bit();
+            }
+        }
+        if near_edges | near_thin == 0 {
+            return;
+        }
+        let (corners, all) = (Tile::around(near_edges), Tile::around(near_thin));
+        for (number, (view, patch)) in self.views.iter_mut().zip(&mut *self.patches).enumerate() {
+            let square = patch.square_bit();
+            if (corners | all) & square == 0
+                || self.prior.assumption(number, index, light) == Assumption::Weak
+            {
+                continue;
+            }
+            aim(view, patch, self.lights, index, light);
+            let asked = if all & square != 0 { LaneMask::MAX } else { patch.corners };
+            view.wanted |= asked & view.facing & !view.traced;
+        }
+    }
+}
+
+/// Aims the rays of a patch at a light, unless they are.
+#[inline(always)]
+fn aim(view: &mut View, patch: &mut Patch, lights: &PackedLights, index: usize, light: usize) {
+    if !view.aimed {
+        view.facing = patch.group.aim(&lights.chunks()[index], light);
+        view.aimed = true;
+    }
+}
+
+/// Place of a square of a tile along a Morton curve.
+fn morton(square: u8) -> u8 {
+    let spread = |bits: u8| bits & 1 | (bits & 2) << 1 | (bits & 4) << 2;
+    spread(square) | spread(square >> 3) << 1
+}
+
+/// One of some points, if there are any; `which` is a number that picks different ones each time.
+fn any_of(points: LaneMask, which: usize) -> LaneMask {
+    let start = which as u32 % LANES as u32;
+    let rotated = (points as u16).rotate_right(start);
+    if rotated == 0 { 0 } else { 1 << ((rotated.trailing_zeros() + start) % LANES as u32) }
+}
+
+/// What every light would give a tile without any occluder, up to a factor, by chunk.
+#[inline(always)]
+fn strengths(lights: &PackedLights, vertices: &[PathVertex]) -> Vec<Lanes> {
+    let mut strengths =
+        Strengths { lights, normal: Vec3::ZERO, sums: vec![[0.0; LANES]; lights.chunks().len()] };
+    let places = PLACES.min(vertices.len());
+    for place in 0..places {
+        let surface = &vertices[(2 * place + 1) * vertices.len() / (2 * places)].surface;
+        strengths.normal = surface.shading_normal;
+        lights.incident_at(surface.position, &mut strengths);
+    }
+    strengths.sums
+}
+
+/// Sums of what lights would give some places, see [`strengths`].
+struct Strengths<'a> {
+    lights: &'a PackedLights,
+    normal: Vec3,
+    sums: Vec<Lanes>,
+}
+
+impl IncidentLights for Strengths<'_> {
+    #[inline(always)]
+    fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
+        let [r, g, b] = &self.lights.chunks()[index].intensity;
+        let n = self.normal;
+        let sums = &mut self.sums[index];
+        for lane in 0..LANES {
+            let cosine = n.x * direction[0][lane] + n.y * direction[1][lane] + n.z * direction[2][lane];
+            let cosine = if cosine > 0.0 { cosine } else { 0.0 };
+            let share = ANY_NORMAL + (1.0 - ANY_NORMAL) * cosine;
+            sums[lane] += (r[lane] + g[lane] + b[lane]) * reciprocal[lane] * share;
+        }
+    }
+}
