@@ -168,15 +168,19 @@ fn render_frame<A: Accel>(
     settings: &Settings,
     meshes: &mut LightMeshes,
 ) -> Result<(Image, RenderStats), RenderError> {
-    let mut stats = RenderStats::default();
+    let integrator = match settings.shading.integrator {
+        Integrator::Auto => Integrator::LightMesh,
+        named => named,
+    };
+    let mut stats = RenderStats { integrator: Some(integrator), ..RenderStats::default() };
     let world = frame.world;
-    let image = match settings.shading.integrator {
+    let image = match integrator {
         Integrator::Conventional => {
             let scale = settings.shading.direct_scale();
             frame.run(&mut ConventionalIntegrator { world, scale }, &mut stats)?
         }
         Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
-        Integrator::LightMesh => {
+        Integrator::LightMesh | Integrator::Auto => {
             let interpolation = meshes.interpolation(world.scene, settings)?;
             let counters = &mut stats.mesh_points;
             counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);

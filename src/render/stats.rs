@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
+use crate::settings::Integrator;
 
 /// Wall-clock seconds per stage of rendering.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -56,6 +57,8 @@ pub struct MeshCounters {
 /// What one render did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RenderStats {
+    /// What computed the illumination, never [`Integrator::Auto`]; `None` before.
+    pub integrator: Option<Integrator>,
     /// Seconds per stage.
     pub seconds: StageSeconds,
     /// Rays by kind.

@@ -103,6 +103,8 @@ named_enum! {
         Conventional = "conventional",
         /// What a light mesh of infinite density would give, by dense sampling around every surface point; slow
         Reference = "reference",
+        /// Light mesh or conventional, whichever is estimated to cost less
+        Auto = "auto",
     }
 }
 
