@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use plotters::prelude::*;
 
+use super::markup::escape;
 use super::report::{Plot, Report, Table};
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#222}\
@@ -34,21 +35,34 @@ pub fn to_html(report: &Report) -> String {
     if report.quick {
         html.push_str("<p class=\"warning\">Quick run: the numbers say nothing about speed.</p>\n");
     }
-    html.push_str("<h2>Goals</h2>\n<ul>\n");
-    for goal in &report.goals {
-        let class = if goal.pass { "pass" } else { "short" };
-        // Writing to a string cannot fail.
-        let _ = writeln!(html, "<li class=\"{class}\">{}</li>", escape(&goal.to_string()));
+    if !report.goals.is_empty() {
+        html.push_str("<h2>Goals</h2>\n<ul>\n");
+        for goal in &report.goals {
+            let class = if goal.pass { "pass" } else { "short" };
+            // Writing to a string cannot fail.
+            let _ = writeln!(html, "<li class=\"{class}\">{}</li>", escape(&goal.to_string()));
+        }
+        html.push_str("</ul>\n");
     }
-    html.push_str("</ul>\n");
     for plot in &report.plots {
         // A plot without points has no axes and is left out.
         if let Some(svg) = to_svg(plot) {
             let _ = writeln!(html, "<h2>{}</h2>\n{svg}", escape(&plot.title));
         }
     }
+    for plot in &report.bars {
+        if let Some(svg) = plot.to_svg() {
+            let _ = writeln!(html, "<h2>{}</h2>\n{svg}", escape(&plot.title));
+        }
+    }
     for table in &report.tables {
         push_table(&mut html, table);
+    }
+    let failures = report.results.iter().flat_map(|results| &results.failures);
+    let failures: Vec<String> =
+        failures.map(|failure| format!("<li class=\"short\">{}</li>\n", escape(&failure.error))).collect();
+    if !failures.is_empty() {
+        let _ = writeln!(html, "<h2>Not measured</h2>\n<ul>\n{}</ul>", failures.concat());
     }
     html.push_str("<h2>Raw times</h2>\n<details><summary>All measurements in seconds</summary>\n");
     let raw = Table {
@@ -83,10 +97,6 @@ fn push_table(html: &mut String, table: &Table) {
         html.push_str("</tr>\n");
     }
     html.push_str("</table>\n");
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A plot with logarithmic axes; `None` where there is nothing to show.
@@ -181,6 +191,8 @@ mod tests {
             measurements: Vec::new(),
             goals: Vec::new(),
             tables: vec![Table::new("t & u", &["a"])],
+            bars: Vec::new(),
+            results: None,
             plots: vec![plot(vec![(1.0, 2.0), (10.0, 0.5)]), plot(Vec::new()), plot(vec![(0.0, f64::NAN)])],
         };
         let html = to_html(&report);

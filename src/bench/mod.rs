@@ -4,14 +4,17 @@
 //! ratios mean something on a machine that does other things as well.
 
 mod backends;
+mod bars;
 mod configuration;
 mod curve;
 mod headline;
 mod html;
 mod machine;
+mod markup;
 mod rays;
 mod report;
 mod scaling;
+mod scenes;
 mod setup;
 mod shading;
 mod threads;
@@ -44,6 +47,8 @@ named_enum! {
         Backends = "backends",
         /// Evaluation of mesh points against a loop that only traces the same rays
         Rays = "rays",
+        /// Given scenes by light mesh and by conventional tracing, and which of them `auto` takes
+        Scenes = "scenes",
     }
 }
 
@@ -60,6 +65,10 @@ pub struct BenchOptions {
     pub backend: BackendChoice,
     /// The program to measure whole processes with; without it these measurements are left out.
     pub program: Option<PathBuf>,
+    /// With [`Benchmark::Scenes`]: scene files, models, and folders of them.
+    pub scenes: Vec<PathBuf>,
+    /// With [`Benchmark::Scenes`]: size of the images instead of each scene's own.
+    pub resolution: Option<(u32, u32)>,
 }
 
 impl BenchOptions {
@@ -84,6 +93,15 @@ pub enum BenchError {
     /// The scene has no camera.
     #[error("the scene has no camera")]
     NoCamera,
+    /// The scene has no lights, also after they were chosen for a model that brings none.
+    #[error("the scene has no lights")]
+    NoLights,
+    /// There is nothing to render in a folder.
+    #[error("there are no scenes in it")]
+    NoScenes,
+    /// A folder can't be read.
+    #[error("the folder cannot be read: {0}")]
+    ReadFolder(#[source] std::io::Error),
     /// No backend.
     #[error(transparent)]
     Backend(#[from] BackendError),
@@ -119,5 +137,6 @@ pub fn run(benchmark: Benchmark, options: &BenchOptions, log: &dyn Fn(&str)) -> 
         Benchmark::Scaling => scaling::run(options, log),
         Benchmark::Backends => backends::run(options, log),
         Benchmark::Rays => rays::run(options, log),
+        Benchmark::Scenes => scenes::run(options, log),
     }
 }

@@ -4,7 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::bars::BarPlot;
 use super::machine::Machine;
+use super::scenes::SceneResults;
 use super::timing::Samples;
 
 /// Everything that one benchmark measured.
@@ -31,6 +33,12 @@ pub struct Report {
     /// Curves for people.
     #[serde(skip)]
     pub plots: Vec<Plot>,
+    /// Bars for people.
+    #[serde(skip)]
+    pub bars: Vec<BarPlot>,
+    /// What was found about given scenes; its fields are the report's own.
+    #[serde(flatten)]
+    pub results: Option<SceneResults>,
 }
 
 /// Repeated times of one thing.
@@ -185,6 +193,9 @@ impl fmt::Display for Report {
         }
         for goal in &self.goals {
             writeln!(f, "{goal}")?;
+        }
+        for failure in self.results.iter().flat_map(|results| &results.failures) {
+            writeln!(f, "FAILED {}", failure.error)?;
         }
         Ok(())
     }

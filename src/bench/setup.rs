@@ -91,5 +91,7 @@ pub fn new_report(benchmark: &'static str, backend: String, options: &BenchOptio
         goals: Vec::new(),
         tables: Vec::new(),
         plots: Vec::new(),
+        bars: Vec::new(),
+        results: None,
     }
 }

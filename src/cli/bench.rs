@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::choice::named;
 use super::error::{CommandError, Outcome};
+use super::parse;
 use super::shared::{BackendArgs, QuietArgs, ThreadArgs};
 use crate::bench::{self, BenchOptions, Benchmark};
 use crate::image::OutputFile;
@@ -18,6 +19,12 @@ pub struct BenchArgs {
     /// What to measure
     #[arg(default_value_t, value_parser = named::<Benchmark>())]
     benchmark: Benchmark,
+    /// With `scenes`: scene files, models, and folders, which stand for all scenes in them [default: scenes]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// With `scenes`: size of the images instead of each scene's own
+    #[arg(long, value_name = "WxH", value_parser = parse::resolution)]
+    resolution: Option<(u32, u32)>,
     /// Write raw times and goals as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -41,10 +48,32 @@ pub struct BenchArgs {
     quiet: QuietArgs,
 }
 
+/// The folder of scenes that are measured if none are named, seen from the repository's root.
+const SCENES: &str = "scenes";
+
+impl BenchArgs {
+    /// Refuses scenes for a benchmark that makes its own.
+    pub fn check(&self) -> Result<(), String> {
+        let takes_scenes = self.benchmark == Benchmark::Scenes;
+        if takes_scenes || self.scenes.is_empty() && self.resolution.is_none() {
+            return Ok(());
+        }
+        Err(format!(
+            "`bench {}` makes its own scenes; only `bench scenes` takes some, and --resolution",
+            self.benchmark
+        ))
+    }
+
+    fn scenes(&self) -> Vec<PathBuf> {
+        if self.scenes.is_empty() { vec![PathBuf::from(SCENES)] } else { self.scenes.clone() }
+    }
+}
+
 /// Runs a benchmark and prints its tables and goals. A goal that is missed is a result and no failure.
 ///
 /// # Errors
-/// See [`CommandError`]; then no file has changed.
+/// See [`CommandError`]; then no file has changed, except for [`CommandError::NotMeasured`], which comes after everything
+/// that was measured is printed and written.
 pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
     let json = args.json.as_deref().map(OutputFile::new).transpose()?;
     let html = args.html.as_deref().map(OutputFile::new).transpose()?;
@@ -56,6 +85,8 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Result<Outcome, CommandErro
         backend: args.backend.backend,
         // A system that doesn't report its path leaves measurements of whole processes out.
         program: std::env::current_exe().ok(),
+        scenes: args.scenes(),
+        resolution: args.resolution,
     };
     let pool = args.threads.pool()?;
     // The threads of the pool measure; this one listens, so that the listener need not be shared.
@@ -77,5 +108,11 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Result<Outcome, CommandErro
         file.write(bench::to_html(&report).as_bytes())?;
     }
     write!(out, "{report}")?;
+    let failures = report.results.into_iter().flat_map(|results| results.failures);
+    let failures: Vec<String> = failures.map(|failure| failure.error).collect();
+    if !failures.is_empty() {
+        out.flush()?;
+        return Err(CommandError::NotMeasured(failures));
+    }
     Ok(Outcome::Passed)
 }

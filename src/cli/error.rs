@@ -151,6 +151,9 @@ pub enum CommandError {
     /// A benchmark can't be run.
     #[error(transparent)]
     Bench(#[from] BenchError),
+    /// Scenes can't be measured; each text names one and says why.
+    #[error("{} not measured: {}", .0.len(), .0.join("; "))]
+    NotMeasured(Vec<String>),
     /// Only a model can be turned into a scene file.
     #[error("{}: is not a model (known: .glb, .gltf, .obj, .ply)", .0.display())]
     NotAModel(PathBuf),

@@ -19,7 +19,8 @@ mod stats_file;
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind as UsageError;
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub use error::{CommandError, Outcome, describe};
 
@@ -51,6 +52,16 @@ enum Command {
     Compare(compare::CompareArgs),
 }
 
+impl Cli {
+    /// Refuses what the declarations of the flags can't express.
+    fn checked(self) -> Result<Self, clap::Error> {
+        if let Command::Bench(args) = &self.command {
+            args.check().map_err(|text| Self::command().error(UsageError::ArgumentConflict, text))?;
+        }
+        Ok(self)
+    }
+}
+
 impl Command {
     fn run(&self, out: &mut dyn Write) -> Result<Outcome, CommandError> {
         match self {
@@ -73,7 +84,7 @@ const USAGE: u8 = 2;
 ///
 /// Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse().and_then(Cli::checked) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed pipe behind --help is not an error.
@@ -119,8 +130,6 @@ fn unless_closed<T>(result: io::Result<T>, dropped: T) -> io::Result<T> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory as _;
-
     use super::*;
 
     /// Clap's own checks: no flag is declared twice, defaults can be parsed.

@@ -108,6 +108,9 @@ fn render_to(
     let (image, stats) =
         rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;
     bar.finish();
+    if let Some(choice) = &stats.choice {
+        reporter.line(&format!("note: {choice}"));
+    }
     seconds.paths = stats.seconds.paths;
     seconds.mesh = stats.seconds.mesh;
     seconds.shade = stats.seconds.shade;
@@ -143,6 +146,8 @@ fn render_to(
         samples_per_pixel: settings.view.samples_per_pixel,
         threads: rayon::current_num_threads(),
         seconds,
+        integrator: stats.integrator,
+        choice: stats.choice,
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,

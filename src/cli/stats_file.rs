@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::render::{MeshCounters, RayCounters};
+use crate::render::{Choice, MeshCounters, RayCounters};
+use crate::settings::Integrator;
 
 /// Contents of the file.
 #[derive(Debug, Serialize)]
@@ -25,6 +26,10 @@ pub struct StatsFile {
     pub threads: usize,
     /// Wall-clock seconds.
     pub seconds: Seconds,
+    /// What computed the illumination.
+    pub integrator: Option<Integrator>,
+    /// Why, where the integrator was `auto`.
+    pub choice: Option<Choice>,
     /// Rays by kind.
     pub rays: RayCounters,
     /// Counters of the light meshes.

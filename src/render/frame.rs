@@ -84,7 +84,7 @@ impl<'a, A: Accel> Frame<'a, A> {
     }
 
     /// Traces the camera paths of a block; what `paths` held before is gone, but its memory is used again.
-    fn trace(
+    pub(super) fn trace(
         &self,
         block: &[Tile],
         paths: &mut Vec<TilePaths>,

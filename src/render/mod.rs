@@ -4,6 +4,7 @@
 //! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate),
 //! [`shade_tile`] with an [integrator](integrators), and [`resolve`].
 
+mod choice;
 mod error;
 mod film;
 mod frame;
@@ -16,6 +17,7 @@ mod surface_group;
 mod tiles;
 mod trace;
 
+pub use choice::{Choice, Reason};
 pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::choice::choose;
 use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::frame::{Frame, StopToken};
@@ -171,13 +172,22 @@ fn render_frame<A: Accel>(
 ) -> Result<(Image, RenderStats), RenderError> {
     let mut stats = RenderStats::default();
     let world = frame.world;
-    let image = match settings.shading.integrator {
+    let integrator = match settings.shading.integrator {
+        Integrator::Auto => {
+            let choice = choose(&frame, camera, settings, meshes, &mut stats)?;
+            stats.choice = Some(choice);
+            choice.integrator
+        }
+        named => named,
+    };
+    stats.integrator = Some(integrator);
+    let image = match integrator {
         Integrator::Conventional => {
             let scale = settings.shading.direct_scale();
             frame.run(&mut ConventionalIntegrator { world, scale }, &mut stats)?
         }
         Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
-        Integrator::LightMesh => {
+        Integrator::LightMesh | Integrator::Auto => {
             let interpolation = meshes.interpolation(world.scene, camera, settings)?;
             let counters = &mut stats.mesh_points;
             counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);

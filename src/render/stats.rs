@@ -2,8 +2,10 @@
 
 use serde::Serialize;
 
+use super::choice::Choice;
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
+use crate::settings::Integrator;
 
 /// Wall-clock seconds per stage of rendering.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -56,6 +58,10 @@ pub struct MeshCounters {
 /// What one render did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RenderStats {
+    /// What computed the illumination, never [`Integrator::Auto`]; `None` before.
+    pub integrator: Option<Integrator>,
+    /// How [`Integrator::Auto`] came to it.
+    pub choice: Option<Choice>,
     /// Seconds per stage.
     pub seconds: StageSeconds,
     /// Rays by kind.

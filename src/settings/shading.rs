@@ -27,7 +27,7 @@ pub struct ShadingSettings {
 impl Default for ShadingSettings {
     fn default() -> Self {
         Self {
-            integrator: Integrator::LightMesh,
+            integrator: Integrator::Auto,
             reference_samples: 256,
             lambertian: false,
             estimator: Estimator::PerLight,
@@ -100,6 +100,8 @@ pub enum Radius {
 named_enum! {
     /// What computes the illumination of a surface point (method §10).
     pub enum Integrator {
+        /// Light mesh, or conventional where that gives the same shadows for less
+        Auto = "auto",
         /// Interpolation of light meshes
         LightMesh = "light-mesh",
         /// One occlusion ray per light at every surface point

@@ -117,6 +117,8 @@ pub fn session(scene: &Scene) -> Session {
 /// The default settings at a resolution.
 pub fn settings_at(resolution: (u32, u32)) -> Settings {
     let mut settings = Settings::default();
+    // What `auto` takes is tested by itself.
+    settings.shading.integrator = Integrator::LightMesh;
     settings.view.resolution = resolution;
     settings
 }

@@ -5,7 +5,7 @@ use lightmesh::image::Image;
 use lightmesh::scene::Falloff;
 use lightmesh::scene::generate::interior::Interior;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
-use lightmesh::settings::{Leaks, Neighbourhood, Radius, Resolve, Spacing};
+use lightmesh::settings::{Integrator, Leaks, Neighbourhood, Radius, Resolve, Spacing};
 
 use crate::common::failed::assert_images;
 use crate::common::{camera, conventional, forest, grey, light, picture, settings_at};
@@ -22,6 +22,7 @@ fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32
     let mut settings = loaded.settings.clone();
     settings.view.resolution = (1200, 1200);
     settings.mesh.indirect = None;
+    settings.shading.integrator = Integrator::LightMesh;
     settings.shading.resolve = Resolve::Trace;
     settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
     settings.shading.kernel.radius = Radius::Spacings(radius_in_spacings);

@@ -7,6 +7,13 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 fn bench(folder: &Path, arguments: &[&str]) -> (Output, Value, String) {
+    let result = bench_unless_failed(folder, arguments);
+    assert!(result.0.status.success(), "{}", String::from_utf8_lossy(&result.0.stderr));
+    result
+}
+
+/// The same of a benchmark that may end with an error after it wrote what it measured.
+fn bench_unless_failed(folder: &Path, arguments: &[&str]) -> (Output, Value, String) {
     let (json, html) = (folder.join("out.json"), folder.join("out.html"));
     let output = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
         .arg("bench")
@@ -17,7 +24,6 @@ fn bench(folder: &Path, arguments: &[&str]) -> (Output, Value, String) {
         .arg(&html)
         .output()
         .expect("the program runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report = serde_json::from_slice(&fs::read(&json).expect("JSON is written")).expect("JSON is valid");
     (output, report, fs::read_to_string(&html).expect("HTML is written"))
 }
@@ -103,6 +109,122 @@ fn rays_compares_evaluation_with_a_bare_loop() {
     let result = bench(folder.path(), &["rays"]);
     check_form("rays", &result);
     assert!(goals(&result.1).iter().all(|name| name.contains("bare loop")));
+}
+
+const MODEL: &str = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
+
+const SCENE: &str = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[render]\nintegrator = \"reference\"\n\
+                     [[geometry]]\nfile = \"model.obj\"\n";
+
+const LIGHT: &str = "[[light]]\nposition = [0, 1, 2]\nintensity = 1\n";
+
+/// What is promised of each scene that was measured.
+fn check_scene(scene: &Value) {
+    let number = |key: &str| scene[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {scene}"));
+    let name = scene["name"].as_str().expect("a name");
+    assert!(number("lights") >= 1.0 && number("triangles") >= 1.0, "{name}");
+    assert!(number("seconds") > 0.0 && number("conventional_seconds") > 0.0 && number("auto_seconds") > 0.0);
+    let ratio = number("conventional_seconds") / number("seconds");
+    assert!((number("ratio") / ratio - 1.0).abs() < 1e-9, "{name}: {} is not {ratio}", scene["ratio"]);
+    // Lights whose shadow edges are traced differ little, those that are averaged by less than the image's mean.
+    assert!((0.0..1.0).contains(&number("block_mean_relative_error")), "{name}");
+    if cfg!(feature = "flip") {
+        assert!((0.0..0.5).contains(&number("flip")), "{name}");
+    } else {
+        assert!(scene["flip"].is_null(), "{name}");
+    }
+    let is_way = |key: &str| ["light-mesh", "conventional"].map(Value::from).contains(&scene[key]);
+    assert!(is_way("chosen") && is_way("cheaper"), "{name}: never `auto`, nor what the file asks for");
+    let faster = if number("ratio") >= 1.0 { "light-mesh" } else { "conventional" };
+    assert_eq!(scene["cheaper"], faster, "{name}");
+    let excess = if faster == "light-mesh" { ratio } else { 1.0 / ratio };
+    assert_eq!(scene["auto_right"], scene["chosen"] == scene["cheaper"] || excess <= 1.05, "{name}");
+    for way in ["light_mesh", "conventional", "auto"] {
+        for stage in ["paths", "mesh", "shade"] {
+            assert!(scene["stages"][way][stage].is_number(), "{name}: {way} {stage}");
+        }
+        assert!(scene["rays"][way]["camera"].as_u64() >= Some(1), "{name}: {way}");
+    }
+    // Evaluation starts from nothing in every run, and conventional tracing evaluates nothing.
+    assert!(scene["mesh_points"]["direct"]["evaluated"].as_u64() >= Some(1), "{name}");
+    assert_eq!(scene["stages"]["conventional"]["mesh"], 0.0, "{name}");
+}
+
+/// Scene files, bare models and what is in folders, each with what was measured of it.
+#[test]
+fn scenes_compares_both_ways_and_the_choice_between_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("model.obj"), MODEL).expect("writable");
+    fs::write(folder.path().join("scene.toml"), SCENE.to_owned() + LIGHT).expect("writable");
+    fs::write(folder.path().join("list.toml"), "title = \"about scenes\"\n").expect("writable");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/leaks/guarded.toml");
+    let path = folder.path().to_str().expect("UTF-8");
+    let result = bench(folder.path(), &["scenes", file, path, "--resolution", "24x18"]);
+    check_form("scenes", &result);
+    let scenes = result.1["scenes"].as_array().expect("a list");
+    let names: Vec<&str> = scenes.iter().filter_map(|scene| scene["name"].as_str()).collect();
+    assert_eq!(names, [file, &format!("{path}/model.obj"), &format!("{path}/scene.toml")]);
+    for scene in scenes {
+        check_scene(scene);
+        assert_eq!(scene["resolution"], serde_json::json!([24, 18]));
+        assert_eq!(scene["rounds"], 2);
+    }
+    assert_eq!(result.1["failures"], serde_json::json!([]));
+    let text = String::from_utf8_lossy(&result.0.stdout);
+    for part in ["ratio", "FLIP", "auto was right", "Seconds by stage", "Rays by kind"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(result.2.matches("<svg").count(), 2, "ratios and stages are plotted");
+}
+
+/// A scene that can't be measured is named in every output and in the error at the end, and the others are there.
+#[test]
+fn a_scene_that_cannot_be_measured_takes_nothing_from_the_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenes = folder.path().join("scenes");
+    fs::create_dir(&scenes).expect("writable");
+    for (name, text) in [
+        ("a-damaged.obj", "v 1 2\n"),
+        ("b-dark.toml", SCENE),
+        ("c-fine.toml", &(SCENE.to_owned() + LIGHT)),
+        ("d-torn.toml", "[[geometry]\n"),
+        ("model.obj", MODEL),
+    ] {
+        fs::write(scenes.join(name), text).expect("writable");
+    }
+    let path = scenes.to_str().expect("UTF-8");
+    let result = bench_unless_failed(folder.path(), &["scenes", path, "missing.glb"]);
+    check_form("scenes", &result);
+    let (output, report, html) = &result;
+    assert_eq!(output.status.code(), Some(1));
+    let measured = report["scenes"].as_array().expect("a list");
+    let names: Vec<&str> = measured.iter().filter_map(|scene| scene["name"].as_str()).collect();
+    assert_eq!(names, [format!("{path}/c-fine.toml"), format!("{path}/model.obj")]);
+    measured.iter().for_each(check_scene);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.starts_with("lightmesh: 4 not measured: "), "{message}");
+    let failures = report["failures"].as_array().expect("a list");
+    assert_eq!(failures.len(), 4);
+    let failed = ["a-damaged.obj", "b-dark.toml", "d-torn.toml", "missing.glb"];
+    for (failure, name) in failures.iter().zip(failed) {
+        let error = failure["error"].as_str().expect("a text");
+        assert!(failure["name"].as_str().is_some_and(|file| file.ends_with(name)), "{failure}");
+        assert_eq!(error.matches(name).count(), 1, "{error}");
+        for place in [&message, &String::from_utf8_lossy(&output.stdout), &html.as_str().into()] {
+            assert!(place.contains(name), "{name}");
+        }
+    }
+}
+
+/// Scenes for a benchmark that makes its own are wrong usage, rather than left out.
+#[test]
+fn only_one_benchmark_takes_scenes() {
+    for arguments in [&["bench", "rays", "a.toml"][..], &["bench", "--resolution", "8x8"]] {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_lightmesh")).args(arguments).output().expect("the program runs");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("bench scenes"), "{arguments:?}");
+    }
 }
 
 /// A folder in place of the file is found out before anything is measured.

@@ -1,0 +1,190 @@
+//! One scene by both ways.
+
+use std::path::Path;
+
+use super::result::{SceneResult, Ways, judge};
+use crate::accel::Backend;
+use crate::bench::report::Report;
+use crate::bench::setup::Setup;
+use crate::bench::timing::{Samples, timed};
+use crate::bench::{BenchError, BenchOptions};
+use crate::framing::choose_view;
+use crate::image::Image;
+use crate::image::metrics::{MetricsOptions, compare};
+use crate::image::tone::auto_exposure;
+use crate::render::{RenderStats, SessionError, StageSeconds};
+use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
+use crate::settings::{Integrator, Settings};
+
+/// The longer side of images of a quick run, pixels.
+const QUICK_SIDE: u32 = 32;
+
+/// What is kept of a frame.
+struct Run {
+    stats: RenderStats,
+    seconds: f64,
+}
+
+/// A scene as `lightmesh render` would render it, with its acceleration structure.
+struct Opened {
+    setup: Setup,
+    backend: Backend,
+    build_seconds: f64,
+    /// Whether nobody stated an exposure.
+    bare: bool,
+}
+
+impl Opened {
+    fn new(file: &Path, options: &BenchOptions) -> Result<Self, BenchError> {
+        let (load_seconds, opened) = timed(|| open_scene(file));
+        let mut opened = opened?;
+        let resolution = &mut opened.loaded.settings.view.resolution;
+        *resolution = options.resolution.unwrap_or(*resolution);
+        if options.quick {
+            *resolution = within(*resolution, QUICK_SIDE);
+        }
+        opened.loaded.scene.validate().map_err(SessionError::from)?;
+        let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
+        let backend = built?.backend;
+        let OpenedScene { loaded, bare, .. } = choose_view(&opened, &backend).complete(opened);
+        let LoadedScene { scene, cameras, settings, .. } = loaded;
+        if scene.lights.is_empty() {
+            return Err(BenchError::NoLights);
+        }
+        let camera = cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
+        let setup = Setup { scene, camera, settings, load_seconds };
+        Ok(Self { setup, backend, build_seconds, bare })
+    }
+
+    /// A frame by one way; light meshes start empty.
+    fn frame(&self, integrator: Integrator) -> Result<(Image, Run), BenchError> {
+        let mut settings: Settings = self.setup.settings.clone();
+        settings.shading.integrator = integrator;
+        let frame = self.setup.frame(&self.backend, &settings)?;
+        Ok((frame.image, Run { stats: frame.stats, seconds: frame.seconds }))
+    }
+}
+
+/// Measures a scene; raw times go to the report.
+pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Result<SceneResult, BenchError> {
+    let opened = Opened::new(file, options)?;
+    let name = file.display().to_string();
+
+    // Pages and caches are warm for both ways. The image is as good as any later one: they are the same to the bit.
+    let (image, _) = opened.frame(Integrator::LightMesh)?;
+    let mut reference = None;
+    let runs = options.budget().alternate(2, |variant| {
+        let (rendered, run) = opened.frame([Integrator::LightMesh, Integrator::Conventional][variant])?;
+        if variant == 1 {
+            reference = Some(rendered);
+        }
+        Ok::<_, BenchError>(run)
+    })?;
+    let (_, auto) = opened.frame(Integrator::Auto)?;
+
+    let [mesh_runs, conventional_runs] = [&runs[0], &runs[1]];
+    let mut record = |way: Integrator, runs: &[Run]| {
+        let mut record = |part: &str, seconds: &dyn Fn(&Run) -> f64| {
+            report.record(format!("{name}: {way}: {part}"), runs.iter().map(seconds).collect())
+        };
+        Medians {
+            frame: record("frame", &|run| run.seconds),
+            stages: record("paths, mesh and shade", &|run| total(&run.stats.seconds)),
+        }
+    };
+    let mesh = record(Integrator::LightMesh, mesh_runs);
+    let conventional = record(Integrator::Conventional, conventional_runs);
+    record(Integrator::Auto, std::slice::from_ref(&auto));
+
+    let Opened { setup: Setup { scene, settings, load_seconds, .. }, backend, build_seconds, bare } = opened;
+    let exposure = match &reference {
+        Some(reference) if bare => auto_exposure(reference.pixels()),
+        _ => settings.output.exposure,
+    };
+    let metrics = reference.and_then(|reference| {
+        // Images of one size can be compared.
+        compare(&image, &reference, MetricsOptions { exposure, threshold: None }).ok()
+    });
+    let (mesh_stats, conventional_stats) = (&mesh_runs[0].stats, &conventional_runs[0].stats);
+    let chosen = auto.stats.integrator;
+    let (cheaper, auto_right) = judge(mesh.stages, conventional.stages, chosen);
+    let (width, height) = settings.view.resolution;
+    Ok(SceneResult {
+        name,
+        lights: scene.lights.len(),
+        triangles: scene.triangle_count(),
+        resolution: [width, height],
+        samples_per_pixel: settings.view.samples_per_pixel,
+        indirect_light: settings.mesh.indirect.is_some(),
+        backend: backend.to_string(),
+        load_seconds,
+        build_seconds,
+        rounds: mesh_runs.len(),
+        ratio: conventional.stages / mesh.stages,
+        seconds: mesh.stages,
+        conventional_seconds: conventional.stages,
+        frame_seconds: Ways { light_mesh: mesh.frame, conventional: conventional.frame, auto: auto.seconds },
+        auto_seconds: auto.seconds,
+        exposure,
+        flip: metrics.as_ref().and_then(|metrics| metrics.flip),
+        block_mean_relative_error: metrics.and_then(|metrics| metrics.block_mean_relative_error),
+        chosen,
+        cheaper,
+        auto_right,
+        stages: Ways {
+            light_mesh: stage_medians(mesh_runs),
+            conventional: stage_medians(conventional_runs),
+            auto: auto.stats.seconds,
+        },
+        rays: Ways {
+            light_mesh: mesh_stats.rays,
+            conventional: conventional_stats.rays,
+            auto: auto.stats.rays,
+        },
+        mesh_points: mesh_stats.mesh_points,
+        light_mesh_bytes: mesh_stats.light_mesh_bytes,
+    })
+}
+
+/// Medians of the frames by one way.
+struct Medians {
+    /// Wall-clock seconds.
+    frame: f64,
+    /// Seconds of all stages.
+    stages: f64,
+}
+
+fn total(seconds: &StageSeconds) -> f64 {
+    seconds.paths + seconds.mesh + seconds.shade
+}
+
+fn stage_medians(runs: &[Run]) -> StageSeconds {
+    let median = |stage: fn(&StageSeconds) -> f64| {
+        Samples(runs.iter().map(|run| stage(&run.stats.seconds)).collect()).median()
+    };
+    StageSeconds {
+        paths: median(|seconds| seconds.paths),
+        mesh: median(|seconds| seconds.mesh),
+        shade: median(|seconds| seconds.shade),
+    }
+}
+
+/// A size of the same shape whose longer side is at most `most`.
+fn within((width, height): (u32, u32), most: u32) -> (u32, u32) {
+    let longer = width.max(height).max(most);
+    let scaled = |side: u32| (u64::from(side) * u64::from(most) / u64::from(longer)).max(1) as u32;
+    (scaled(width), scaled(height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quick images keep their shape, are never empty and never enlarged.
+    #[test]
+    fn quick_images_are_small() {
+        assert_eq!(within((800, 600), 32), (32, 24));
+        assert_eq!(within((4000, 1), 32), (32, 1));
+        assert_eq!(within((8, 20), 32), (8, 20));
+    }
+}
