@@ -4,9 +4,10 @@ use super::leaks::{LeakGuard, LeakedPoints};
 use super::points::{CellCache, Kernel, Neighbourhoods, Neighbours, PointPacket, Surroundings};
 use super::slot::UNKNOWN;
 use super::store::{NeededPoints, PointMask, PointStore};
-use crate::accel::Accel;
-use crate::scene::SurfacePoint;
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
+use crate::scene::{Ray, SurfacePoint};
 use crate::settings::Leaks;
+use crate::simd::LANES;
 
 /// A mesh's points as surface points see them: with a kernel.
 #[derive(Clone, Copy)]
@@ -17,6 +18,14 @@ pub struct Lookup<'a> {
     pub(crate) neighbourhoods: &'a Neighbourhoods,
     /// Which points of D_y count.
     pub(crate) leaks: Leaks,
+}
+
+/// Tells whether mesh points differ so much that it matters which of them a surface point sees.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+pub(super) trait Differ {
+    /// Whether the points in some slots do.
+    fn differ(&self, slots: &[u32]) -> bool;
 }
 
 /// Working memory and counters of one thread while it looks up mesh points.
@@ -44,15 +53,13 @@ impl LookupScratch {
 impl Lookup<'_> {
     /// Finds the points of D_y that count for a surface point; all must be known.
     ///
-    /// `uncertain` reports whether the points in some slots differ so much that it matters which of them the surface point
-    /// sees.
     #[inline(always)]
     pub(super) fn find<A: Accel>(
         &self,
         accel: &A,
         surface: &SurfacePoint,
         scratch: &mut LookupScratch,
-        uncertain: impl Fn(&[u32]) -> bool,
+        points: &impl Differ,
     ) {
         let fallback = match &mut scratch.cells {
             Some(cells) => self.known_within(surface, cells, &mut scratch.points),
@@ -62,11 +69,68 @@ impl Lookup<'_> {
         if self.leaks == Leaks::Allow {
             return;
         }
+        if self.leaks == Leaks::Visibility && !fallback && scratch.cells.is_some() {
+            if !points.differ(scratch.points.slots()) {
+                return;
+            }
+            if let Some(rays) = self.keep_seen(accel, surface, scratch) {
+                scratch.rays += rays;
+                return;
+            }
+        }
         let guard = LeakGuard { accel, leaks: self.leaks, positions: self.store.positions() };
-        let LeakedPoints { rays, all_dropped } =
-            guard.keep_counting(surface, &mut scratch.points, |slot| self.store.is_inside(slot), uncertain);
+        let LeakedPoints { rays, all_dropped } = guard.keep_counting(
+            surface,
+            &mut scratch.points,
+            |slot| self.store.is_inside(slot),
+            |slots| points.differ(slots),
+        );
         scratch.rays += rays;
         scratch.fallbacks += u64::from(all_dropped);
+    }
+
+    /// Keeps those points of D_y that are seen by the surface points of the cell that face the same way, all if none is. Returns
+    /// the number of rays; `None` where there are no cells.
+    ///
+    /// Whether a wall stands between a cell and a mesh point is asked once, from the first surface point that has the mesh
+    /// point in its D_y, and not for every pixel. Surfaces that face different ways, such as the two sides of a thin wall,
+    /// don't answer for each other.
+    #[inline(never)]
+    fn keep_seen<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Option<u64> {
+        let LookupScratch { points, cells, .. } = scratch;
+        let (kernel, around) = self.around(surface, cells.as_mut()?)?;
+        let octant = usize::from(surface.geometric_normal.is_negative_bitmask() as u8 & 7);
+        let origin = surface.ray_origin();
+        let (mut rays, mut any_clear) = (0, false);
+        for packet in &mut *around.packets {
+            let (_, lanes) = packet.weigh(&kernel);
+            let unknown = lanes & !packet.sight[octant].known;
+            if unknown != 0 {
+                let mut query = RayPacket::<LANES>::empty();
+                for lane in (0..LANES).filter(|lane| unknown >> lane & 1 == 1) {
+                    query.set_lane(lane, &Ray::between(origin, packet.position(lane)));
+                }
+                let active = LaneMask::from(unknown);
+                let blocked = accel.occluded_packet(active, &mut query, Coherence::Incoherent);
+                packet.sight[octant].known |= unknown;
+                packet.sight[octant].clear |= (active & !blocked) as u16;
+                rays += u64::from(unknown.count_ones());
+            }
+            any_clear |= lanes & packet.sight[octant].clear != 0;
+        }
+        if any_clear {
+            points.clear();
+            for packet in around.packets {
+                let (weights, lanes) = packet.weigh(&kernel);
+                points.push_packet(packet, &weights, lanes & packet.sight[octant].clear);
+            }
+        }
+        Some(rays)
     }
 
     /// D_y with slots for one of many surface points that lie close together: `cells` keeps what is the same for all. It must
@@ -139,7 +203,7 @@ impl Lookup<'_> {
                     let mut new = lanes & !packet.needed;
                     packet.needed |= lanes;
                     while new != 0 {
-                        slots.push(packet.slots[new.trailing_zeros() as usize % crate::simd::LANES]);
+                        slots.push(packet.slots[new.trailing_zeros() as usize % LANES]);
                         new &= new - 1;
                     }
                 }

@@ -9,4 +9,7 @@ mod visibility;
 pub use emissive::EmissiveTriangles;
 pub use packed::PackedLights;
 pub(crate) use packed::{IncidentLights, LightChunk, SurfaceLanes};
-pub(crate) use visibility::{VisibilityBits, expand_bits};
+pub(crate) use visibility::{SeenLights, VisibilityBits, expand_bits};
+// For tests and benches only.
+#[doc(hidden)]
+pub use visibility::{Unoccluded, Visibility};

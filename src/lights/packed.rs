@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
 use super::kinds::KindLanes;
-use super::visibility::VisibilityBits;
+use super::visibility::{Visibility, VisibilityBits};
 use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
 
@@ -139,13 +139,13 @@ const TINY_DISTANCE: f32 = 1e-18;
 
 impl PackedLights {
     /// Σ_i V_i · φ2(n_y, lp_i − y) · E_i / φ1(|lp_i − y|), with the visibility V of each chunk's lights given by
-    /// `visibility(chunk)`; `None` stands for a chunk of which nothing is seen. With V = 1 it is S(y) of method §4.
+    /// `visibility`. With V = 1 it is S(y) of method §4.
     ///
     /// Lights behind the triangle's plane give nothing, whatever the shading normal says (method §7).
     // For tests and benches only.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl FnMut(usize) -> Option<Lanes>) -> Vec3 {
+    pub fn irradiance(&self, surface: &SurfacePoint, visibility: impl Visibility) -> Vec3 {
         with_falloff!(self.falloff, law => self.irradiance_with(surface, law, visibility))
     }
 
@@ -154,13 +154,13 @@ impl PackedLights {
         &self,
         surface: &SurfacePoint,
         law: impl FalloffLaw,
-        mut visibility: impl FnMut(usize) -> Option<Lanes>,
+        mut visibility: impl Visibility,
     ) -> Vec3 {
         let y = surface.position;
         let (n, g) = (surface.shading_normal, surface.geometric_normal);
         let mut sums = [[0.0f32; LANES]; 3];
         for (index, chunk) in self.chunks.iter().enumerate() {
-            let Some(visible) = visibility(index) else { continue };
+            let Some(visible) = visibility.of_chunk(index) else { continue };
             let mut factor = [0.0f32; LANES];
             if let Some(kinds) = &chunk.kinds {
                 for lane in 0..LANES {
@@ -279,6 +279,7 @@ pub trait IncidentLights {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lights::{SeenLights, Unoccluded};
 
     /// Directions and reciprocals of all chunks.
     fn incident_at_the_origin(table: &PackedLights) -> Vec<([Lanes; 3], Lanes)> {
@@ -312,9 +313,9 @@ mod tests {
             (Falloff::None, Vec3::new(12.0, 9.0, 6.0)),
         ] {
             let table = PackedLights::new(&lights, falloff, 0.0);
-            let sum = table.irradiance(&surface(), |_| Some([1.0; LANES]));
+            let sum = table.irradiance(&surface(), Unoccluded);
             assert!(sum.abs_diff_eq(expected, 1e-5), "{falloff:?}: {sum} for {expected}");
-            assert_eq!(table.irradiance(&surface(), |_| None), Vec3::ZERO);
+            assert_eq!(table.irradiance(&surface(), SeenLights(&[0])), Vec3::ZERO);
         }
     }
 
@@ -324,7 +325,7 @@ mod tests {
         let light = Light::point(Vec3::ZERO, Vec3::ONE);
         for falloff in [Falloff::Linear { constant: 0.0 }, Falloff::InverseSquare, Falloff::None] {
             let table = PackedLights::new(&[light], falloff, 0.0);
-            assert!(table.irradiance(&surface(), |_| Some([1.0; LANES])).is_finite());
+            assert!(table.irradiance(&surface(), Unoccluded).is_finite());
             for (direction, reciprocal) in incident_at_the_origin(&table) {
                 assert!(direction.iter().flatten().chain(&reciprocal).all(|v| v.is_finite()));
             }
@@ -354,7 +355,7 @@ mod tests {
         // 12/2² = 3 on the axis; 3 · ((0.7 − 0.5)/(0.9 − 0.5))² = 3/4 at cosine 0.7; 2 · 0.5 from the sun.
         for (light, expected) in [(spot(1.0), 3.0), (spot(0.7), 0.75), (spot(0.4), 0.0), (sun, 1.0)] {
             let table = PackedLights::new(&[light], Falloff::InverseSquare, 100.0);
-            let sum = table.irradiance(&surface(), |_| Some([1.0; LANES]));
+            let sum = table.irradiance(&surface(), Unoccluded);
             assert!(sum.abs_diff_eq(Vec3::splat(expected), 1e-5), "{light:?}: {sum} for {expected}");
             let reciprocals = incident_at_the_origin(&table)[0].1[0];
             let cosine = if matches!(light.kind, LightKind::Directional { .. }) { 0.5 } else { 1.0 };

@@ -14,3 +14,32 @@ pub fn expand_bits(bits: VisibilityBits) -> Lanes {
     }
     lanes
 }
+
+/// Visibility V of lights from a surface point.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+pub trait Visibility {
+    /// V of the lights of a chunk; `None` where none is seen.
+    fn of_chunk(&mut self, index: usize) -> Option<Lanes>;
+}
+
+/// V = 1.
+pub struct Unoccluded;
+
+impl Visibility for Unoccluded {
+    #[inline(always)]
+    fn of_chunk(&mut self, _: usize) -> Option<Lanes> {
+        Some([1.0; LANES])
+    }
+}
+
+/// The lights whose bits are set are seen, by chunk.
+pub struct SeenLights<'a>(pub &'a [VisibilityBits]);
+
+impl Visibility for SeenLights<'_> {
+    #[inline(always)]
+    fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
+        let bits = self.0[index];
+        (bits != 0).then(|| expand_bits(bits))
+    }
+}

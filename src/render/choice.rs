@@ -58,22 +58,22 @@ impl fmt::Display for Choice {
     }
 }
 
-/// Up to so many lights above the horizon of a surface point are traced, since sorting them out costs as much.
-const FEW_LIGHTS: f32 = 5.0;
-/// In images too small for a trial, from so many lights on the light mesh is taken.
-const MANY_LIGHTS: f32 = 16.0;
+/// In images too small for a trial, from so many lights above the horizon on the light mesh is taken.
+const MANY_LIGHTS: f32 = 4.0;
 
 /// The part of the tiles that is tried, in groups of 2 × 2, at most so many groups, and the least number of groups for which
 /// there is a trial.
-const TRIED: f32 = 0.03;
+const TRIED: f32 = 0.02;
 const MOST_TRIED: usize = 8;
 const LEAST_GROUPS: usize = 20;
 
-/// Costs in rays of conventional shading: of a surface point, a ray from a mesh point, and a ray from a surface point in
-/// hybrid shading, which travels with fewer others. Medians of the models and machines in docs/benchmarks.md.
-const SURFACE_POINT: f32 = 5.0;
+/// Costs in rays of conventional shading: of a surface point in conventional shading and in hybrid shading, of a ray
+/// from a mesh point, and of a ray from a surface point in hybrid shading, which travels with fewer others. They are what
+/// `lightmesh bench scenes` measured on models of all kinds.
+const CONVENTIONAL_POINT: f32 = 2.0;
+const HYBRID_POINT: f32 = 3.5;
 const MESH_RAY: f32 = 1.5;
-const HYBRID_RAY: f32 = 2.5;
+const HYBRID_RAY: f32 = 2.0;
 
 /// Takes an integrator for a frame.
 ///
@@ -93,8 +93,8 @@ pub(super) fn choose<A: Accel>(
     }
     let by_lights = |integrator, lights| Ok(Choice { integrator, reason: Reason::Lights(lights) });
     let world = frame.world;
-    if world.lights.len() as f32 <= FEW_LIGHTS {
-        return by_lights(Integrator::Conventional, world.lights.len() as f32);
+    if world.lights.is_empty() {
+        return by_lights(Integrator::Conventional, 0.0);
     }
     let (groups, whole) = trial_tiles(frame.view.resolution);
     let tiles: Vec<Tile> = groups.concat();
@@ -103,9 +103,6 @@ pub(super) fn choose<A: Accel>(
     let points: usize = paths.iter().map(|paths| paths.vertices.len()).sum();
     let conventional: u64 = paths.par_iter().map(|paths| facing(world.lights, &paths.vertices)).sum();
     let lights = conventional as f32 / points.max(1) as f32;
-    if lights <= FEW_LIGHTS {
-        return by_lights(Integrator::Conventional, lights);
-    }
     if whole < LEAST_GROUPS {
         let many = lights >= MANY_LIGHTS;
         return by_lights(if many { Integrator::LightMesh } else { Integrator::Conventional }, lights);
@@ -136,10 +133,10 @@ pub(super) fn choose<A: Accel>(
     });
     stats.seconds.shade = shade;
     stats.rays.shadow += hybrid;
-    let share = (SURFACE_POINT
+    let share = (HYBRID_POINT
         + MESH_RAY * per_point * world.lights.len() as f32
         + HYBRID_RAY * hybrid as f32 / points.max(1) as f32)
-        / lights;
+        / (CONVENTIONAL_POINT + lights);
     let integrator = if share < 1.0 { Integrator::LightMesh } else { Integrator::Conventional };
     Ok(Choice { integrator, reason: Reason::Trial(share) })
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::trace::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{LightChunk, PackedLights, SurfaceLanes, VisibilityBits, expand_bits};
+use crate::lights::{LightChunk, PackedLights, SeenLights, SurfaceLanes, VisibilityBits};
 use crate::simd::LANES;
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for
@@ -89,7 +89,6 @@ pub(super) fn light_of_seen(
     let chunks = lights.chunks().len();
     for (number, (vertex, light)) in vertices.iter().zip(light).enumerate() {
         let bits = &seen[number * chunks..][..chunks];
-        *light =
-            lights.irradiance(&vertex.surface, |chunk| (bits[chunk] != 0).then(|| expand_bits(bits[chunk])));
+        *light = lights.irradiance(&vertex.surface, SeenLights(bits));
     }
 }

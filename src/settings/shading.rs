@@ -80,7 +80,7 @@ pub struct KernelSettings {
 impl Default for KernelSettings {
     fn default() -> Self {
         Self {
-            radius: Radius::Spacings(2.0),
+            radius: Radius::Spacings(1.5),
             neighbourhood: Neighbourhood::SmoothSphere,
             hemisphere: true,
             leaks: Leaks::Visibility,

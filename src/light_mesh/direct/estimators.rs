@@ -7,8 +7,9 @@ use super::derived::Basis;
 use super::field::DirectField;
 use super::spherical_harmonics;
 use crate::light_mesh::leaks::{amounts_differ, lights_differ};
+use crate::light_mesh::lookup::Differ;
 use crate::light_mesh::points::Neighbours;
-use crate::lights::{PackedLights, VisibilityBits};
+use crate::lights::{PackedLights, Unoccluded, Visibility, VisibilityBits};
 use crate::scene::SurfacePoint;
 use crate::settings::Estimator;
 use crate::simd::{LANES, Lanes};
@@ -48,12 +49,12 @@ impl FieldEstimator<'_> {
             Estimator::PerLight => self.per_light(surface, points, scale),
             Estimator::Paper => {
                 let [direct, _] = self.mean_direct_light(points, scale);
-                direct * self.lights.irradiance(surface, |_| Some([1.0; LANES]))
+                direct * self.lights.irradiance(surface, Unoccluded)
             }
             Estimator::Ratio => {
                 let [direct, unoccluded] = self.mean_direct_light(points, scale);
                 let ratio = Vec3::select(unoccluded.cmpgt(Vec3::ZERO), direct / unoccluded, Vec3::ZERO);
-                ratio * self.lights.irradiance(surface, |_| Some([1.0; LANES]))
+                ratio * self.lights.irradiance(surface, Unoccluded)
             }
             Estimator::Directional => {
                 let mut sums = [Vec4::ZERO; spherical_harmonics::COEFFICIENTS];
@@ -71,30 +72,7 @@ impl FieldEstimator<'_> {
     /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
     #[inline(always)]
     fn per_light(&self, surface: &SurfacePoint, points: &Neighbours, scale: f32) -> Vec3 {
-        let chunks = self.lights.chunks().len();
-        self.lights.irradiance(surface, |chunk| {
-            let (mut all, mut any) = (VisibilityBits::MAX, 0);
-            for &slot in points.slots() {
-                let bits = self.field.bits(slot, chunks)[chunk];
-                all &= bits;
-                any |= bits;
-            }
-            // Most chunks are wholly hidden or wholly seen from all of D_y.
-            if any == 0 {
-                return None;
-            }
-            if all == self.lights.chunks()[chunk].used {
-                return Some([1.0; LANES]);
-            }
-            let mut visible: Lanes = [0.0; LANES];
-            for (slot, weight) in points.iter() {
-                let bits = self.field.bits(slot, chunks)[chunk];
-                for (lane, sum) in visible.iter_mut().enumerate() {
-                    *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
-                }
-            }
-            Some(visible.map(|sum| sum * scale))
-        })
+        self.lights.irradiance(surface, MeanVisibility { estimator: self, points, scale })
     }
 
     /// Ĩ of eq. (3), and the same mean of the unoccluded field.
@@ -108,5 +86,50 @@ impl FieldEstimator<'_> {
         }
         let [a, b, c, d, e, f] = sums.map(|sum| sum * scale);
         [Vec3::new(a, b, c), Vec3::new(d, e, f)]
+    }
+}
+
+impl Differ for FieldEstimator<'_> {
+    #[inline(always)]
+    fn differ(&self, slots: &[u32]) -> bool {
+        self.uncertain(slots)
+    }
+}
+
+/// Mean visibility of every light over D_y.
+struct MeanVisibility<'a> {
+    estimator: &'a FieldEstimator<'a>,
+    points: &'a Neighbours,
+    /// 1 over the sum of the points' weights.
+    scale: f32,
+}
+
+impl Visibility for MeanVisibility<'_> {
+    #[inline(always)]
+    fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
+        let Self { estimator: FieldEstimator { field, lights, .. }, points, scale } = self;
+        let chunks = lights.chunks().len();
+        let (mut all, mut any) = (VisibilityBits::MAX, 0);
+        for &slot in points.slots() {
+            let bits = field.bits(slot, chunks)[index];
+            all &= bits;
+            any |= bits;
+        }
+        // Most chunks are wholly hidden or wholly seen from all of D_y.
+        if any == 0 {
+            return None;
+        }
+        if all == lights.chunks()[index].used {
+            return Some([1.0; LANES]);
+        }
+        let mut visible: Lanes = [0.0; LANES];
+        for (slot, weight) in points.iter() {
+            let bits = field.bits(slot, chunks)[index];
+            for (lane, sum) in visible.iter_mut().enumerate() {
+                *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
+            }
+        }
+        visible.iter_mut().for_each(|sum| *sum *= *scale);
+        Some(visible)
     }
 }

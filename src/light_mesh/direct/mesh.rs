@@ -150,7 +150,7 @@ impl DirectView<'_> {
         scratch: &mut LookupScratch,
     ) -> Vec3 {
         let Self { lookup, estimator } = self;
-        lookup.find(accel, surface, scratch, |slots| estimator.uncertain(slots));
+        lookup.find(accel, surface, scratch, estimator);
         estimator.estimate(surface, &scratch.points)
     }
 

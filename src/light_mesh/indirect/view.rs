@@ -9,7 +9,7 @@ use super::mesh::IndirectMesh;
 use super::octahedral::OctahedralWeights;
 use crate::accel::Accel;
 use crate::light_mesh::leaks::amounts_differ;
-use crate::light_mesh::lookup::{Lookup, LookupScratch};
+use crate::light_mesh::lookup::{Differ, Lookup, LookupScratch};
 use crate::scene::SurfacePoint;
 use crate::settings::{IndirectForm, IndirectShading, Normalization};
 
@@ -42,7 +42,7 @@ impl IndirectView<'_> {
         scratch: &mut LookupScratch,
     ) -> Vec3 {
         let Self { mesh, lookup, shading } = self;
-        lookup.find(accel, surface, scratch, |slots| self.uncertain(slots));
+        lookup.find(accel, surface, scratch, self);
         let points = &mut scratch.points;
         if shading.at_surface {
             let (y, normal) = (surface.position, surface.geometric_normal);
@@ -71,10 +71,11 @@ impl IndirectView<'_> {
         // The mean and far points may enter with weights below 0, so that a single lamp may leave a trace of darkness behind it.
         sum.max(Vec3::ZERO) * scale
     }
+}
 
-    /// Whether the points see so different amounts of light that a wall may stand between them.
+impl Differ for IndirectView<'_> {
     #[inline(always)]
-    fn uncertain(&self, slots: &[u32]) -> bool {
+    fn differ(&self, slots: &[u32]) -> bool {
         amounts_differ(slots.iter().map(|&slot| self.mesh.value(slot)[0].iter().sum()))
     }
 }

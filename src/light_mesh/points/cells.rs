@@ -15,6 +15,15 @@ use crate::simd::{LANES, Lanes};
 const MOST_CELLS: usize = 1 << 9;
 const MOST_PACKETS: usize = 1 << 12;
 
+/// Which of sixteen mesh points surface points see.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// Lanes that were asked for.
+    pub known: u16,
+    /// Those of them that are seen.
+    pub clear: u16,
+}
+
 /// Sixteen mesh points that lie close to a cell.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
@@ -28,6 +37,9 @@ pub struct PointPacket {
     pub needed: u16,
     /// For whose surface points `needed` is.
     pub group: u32,
+    /// By the octant of surface points' normals: lanes of which it is known whether the cell's surface points see them, and
+    /// those that they see.
+    pub sight: [Sight; 8],
     /// Irradiance of the points for one normal, [`Surroundings::normal`], by channel.
     pub lit: [Lanes; 3],
     /// Amount of light at the points, summed over channels and directions; below 0 at points that don't count.
@@ -42,6 +54,7 @@ impl PointPacket {
         slots: [UNKNOWN; LANES],
         needed: 0,
         group: 0,
+        sight: [Sight { known: 0, clear: 0 }; 8],
         lit: [[0.0; LANES]; 3],
         amount: [0.0; LANES],
     };
@@ -49,6 +62,12 @@ impl PointPacket {
     /// Ids of the points that lay in the kernel of some surface point.
     pub fn needed_ids(&self) -> impl Iterator<Item = u64> + '_ {
         (0..LANES).filter(|lane| self.needed >> lane & 1 == 1).map(|lane| self.ids[lane])
+    }
+
+    /// Position of a point.
+    #[inline(always)]
+    pub fn position(&self, lane: usize) -> Vec3 {
+        Vec3::from(self.position.map(|axis| axis[lane]))
     }
 
     /// Weights of the points in a ball, and the lanes that weigh anything.

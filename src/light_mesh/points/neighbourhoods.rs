@@ -200,7 +200,7 @@ pub enum AutoSpacing {
 
 impl AutoSpacing {
     /// What direct mesh points take whose values are averaged.
-    pub const AVERAGED: Self = Self::Scene { spacings: 120.0 };
+    pub const AVERAGED: Self = Self::Scene { spacings: 72.0 };
     /// What indirect mesh points take.
     pub const GATHERED: Self = Self::Scene { spacings: 120.0 / IndirectSettings::COARSENESS };
 }

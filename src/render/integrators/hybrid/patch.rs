@@ -18,8 +18,6 @@ pub(super) struct Patch {
     pub group: SurfaceGroup,
     /// Number of the square in the tile.
     pub square: u8,
-    /// The points whose rays are traced first: some of the corners.
-    pub probes: LaneMask,
     /// The points that stand for all.
     pub corners: LaneMask,
     /// I of each point, by channel.
@@ -38,10 +36,10 @@ impl Patch {
             let same = |vertex: &&PathVertex| tile.square_of(vertex.pixel) == square;
             let last = first + vertices[first..longest].iter().take_while(same).count();
             let points = &vertices[first..last];
-            let (probes, corners) = corners(tile, square, points);
+            let corners = corners(tile, points);
             let light = [[0.0; LANES]; 3];
             let group = SurfaceGroup::new(points);
-            patches.push(Self { vertices: first..last, group, square, probes, corners, light });
+            patches.push(Self { vertices: first..last, group, square, corners, light });
             first = last;
         }
         patches
@@ -54,28 +52,17 @@ impl Patch {
     }
 }
 
-/// Every `step`th point, 2 or 4, of every row, shifted from row to row.
-fn alternate(tile: &Tile, points: &[PathVertex], step: u32) -> LaneMask {
-    let mut lanes = 0;
-    for (lane, vertex) in points.iter().enumerate() {
-        let (x, y) = (vertex.pixel % tile.width, vertex.pixel / tile.width);
-        let chosen = (x + y + (y & 2)).is_multiple_of(step);
-        lanes |= LaneMask::from(chosen) << lane;
-    }
-    lanes
-}
-
 /// Least cosine between normals of a smooth patch.
 const SMOOTH_COSINE: f32 = 0.9;
 /// Greatest distance of its points from a plane, over its extent.
 const SMOOTH_HEIGHT: f32 = 0.2;
 
-/// The points that stand for all of a patch, and those of them that are asked first.
+/// The points that stand for all of a patch.
 ///
-/// If the points lie on one smooth surface they are the corners of the square, of which a straight shadow edge through the patch
-/// separates some from others, and two opposite ones. Else they are every other point, and every fourth.
-fn corners(tile: &Tile, square: u8, points: &[PathVertex]) -> (LaneMask, LaneMask) {
-    let Some(first) = points.first() else { return (0, 0) };
+/// If the points lie on one smooth surface they are the corners of the square, some of which a straight shadow edge through the
+/// patch separates from others. Else they are every other point, as on a chessboard.
+fn corners(tile: &Tile, points: &[PathVertex]) -> LaneMask {
+    let Some(first) = points.first() else { return 0 };
     let (normal, origin) = (first.surface.geometric_normal, first.surface.position);
     let (mut extent, mut height, mut cosine) = (0.0f32, 0.0f32, 1.0f32);
     for vertex in points {
@@ -85,7 +72,12 @@ fn corners(tile: &Tile, square: u8, points: &[PathVertex]) -> (LaneMask, LaneMas
         cosine = cosine.min(normal.dot(vertex.surface.geometric_normal));
     }
     if cosine < SMOOTH_COSINE || height > SMOOTH_HEIGHT * extent.sqrt() {
-        return (alternate(tile, points, 4), alternate(tile, points, 2));
+        let mut lanes = 0;
+        for (lane, vertex) in points.iter().enumerate() {
+            let is_black = (vertex.pixel % tile.width + vertex.pixel / tile.width).is_multiple_of(2);
+            lanes |= LaneMask::from(is_black) << lane;
+        }
+        return lanes;
     }
     // By the pixel: of those that are farthest in each of the four diagonal directions the first.
     let farthest = |sx: i32, sy: i32| {
@@ -101,7 +93,5 @@ fn corners(tile: &Tile, square: u8, points: &[PathVertex]) -> (LaneMask, LaneMas
         }
         1 << best
     };
-    let (falling, rising) = (farthest(-1, -1) | farthest(1, 1), farthest(1, -1) | farthest(-1, 1));
-    // From square to square the diagonals alternate.
-    (if (square ^ square >> 3) & 1 == 0 { falling } else { rising }, falling | rising)
+    farthest(-1, -1) | farthest(1, 1) | farthest(1, -1) | farthest(-1, 1)
 }

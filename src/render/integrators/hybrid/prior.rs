@@ -21,7 +21,7 @@ pub enum Assumption {
 }
 
 /// The part of the tolerance that lights which are too weak to be traced may use up; the rest is for what checks don't find.
-const WEAK_PART: f32 = 0.25;
+const WEAK_PART: f32 = 0.05;
 
 /// Lights of all patches of a tile.
 pub struct Prior<'a> {
@@ -106,7 +106,10 @@ impl<'a> Prior<'a> {
                 }
             }
         }
-        let inverse: Lanes = total.map(|total| if total > 0.0 { 1.0 / total } else { 0.0 });
+        let mut inverse = [0.0; LANES];
+        for lane in 0..LANES {
+            inverse[lane] = if total[lane] > 0.0 { 1.0 / total[lane] } else { 0.0 };
+        }
         for doubt in &mut *doubts {
             let mut most = 0.0;
             for lane in 0..LANES {

@@ -12,7 +12,7 @@ use crate::simd::{LANES, Lanes};
 
 /// Rays per patch that check what is assumed, all lights together. They are shared among the lights in proportion to what each
 /// would give the tile if nothing stood in its way; a patch gets at most one per light.
-const CHECKS: f32 = 16.0;
+const CHECKS: f32 = 40.0;
 
 /// Places of a tile at which the strength of its lights is found.
 const PLACES: usize = 8;
@@ -114,7 +114,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             *view = View { assumed, ..View::default() };
             if assumed.is_none() {
                 aim(view, &mut self.patches[number], self.lights, index, light);
-                view.wanted = view.facing & self.patches[number].probes;
+                view.wanted = view.facing & self.patches[number].corners;
                 if view.wanted == 0 {
                     view.wanted = view.facing;
                 }
@@ -180,7 +180,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
 
     /// Decides what the rays that were traced last ask for.
     ///
-    /// - Probes of an open patch that agree stand for all of its points.
+    /// - Corners of an open patch that agree stand for all of its points.
     /// - Where a ray contradicts what was assumed, the patch's corners are asked; if they all contradict, the assumption is
     ///   turned round.
     /// - Where rays disagree, all of the patch is traced.
