@@ -25,6 +25,9 @@ pub struct Overrides {
     /// What per-light does where mesh points disagree
     #[arg(long, value_parser = named::<Resolve>())]
     resolve: Option<Resolve>,
+    /// With traced shadow edges: what all rays that are spared may cost, as a share of a pixel's light
+    #[arg(long, value_name = "SHARE", value_parser = parse::share)]
+    tolerance: Option<f32>,
     /// Radius of the neighbourhood in scene units, or in spacings: 2.5s
     #[arg(long, value_name = "R", value_parser = parse::radius)]
     radius: Option<Radius>,
@@ -50,6 +53,7 @@ impl Overrides {
         set(&mut shading.reference_samples, self.reference_samples);
         set(&mut shading.estimator, self.estimator);
         set(&mut shading.resolve, self.resolve);
+        set(&mut shading.tolerance, self.tolerance);
         set(&mut shading.kernel.neighbourhood, self.neighbourhood);
         set(&mut shading.kernel.radius, self.radius);
         set(&mut mesh.direct.spacing, self.spacing);

@@ -67,6 +67,14 @@ pub fn radius(text: &str) -> Result<Radius, String> {
     }
 }
 
+/// A share: a number from 0 up.
+pub fn share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(share) if share >= 0.0 && share.is_finite() => Ok(share),
+        _ => Err("a number from 0 up".to_owned()),
+    }
+}
+
 /// A distance between mesh points: one for all axes, one per axis, or `auto`.
 pub fn spacing(text: &str) -> Result<Spacing, String> {
     if text == "auto" {

@@ -16,7 +16,7 @@ fn interior() -> LoadedScene {
     load_scene_file(&folder.path().join("interior.toml")).unwrap()
 }
 
-/// At 1200×1200 at most 1 % of the pixels differ from the conventional ones by more than 2 % of the image's mean, and at
+/// With a tolerance of 0.5 %, at which nothing but the light itself speaks for an open patch, at 1200×1200 at most 1 % of the pixels differ from the conventional ones by more than 2 % of the image's mean, and at
 /// most the given share of the conventional shadow rays is traced, those of the mesh points included.
 fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32, share: f64) {
     let mut settings = loaded.settings.clone();
@@ -24,6 +24,7 @@ fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32
     settings.mesh.indirect = None;
     settings.shading.integrator = Integrator::LightMesh;
     settings.shading.resolve = Resolve::Trace;
+    settings.shading.tolerance = 5e-3;
     settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
     settings.shading.kernel.radius = Radius::Spacings(radius_in_spacings);
     let (reference, conventional) = conventional(&loaded.scene, &loaded.cameras[0], &settings);
@@ -41,7 +42,7 @@ fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32
 /// Leaves of all sizes shade each other: few pairs of places and lights are wholly lit or wholly dark.
 #[test]
 fn in_the_forest_a_quarter_of_the_shadow_rays_is_saved() {
-    assert_saves_rays(&forest(23_542, 100), 0.2, 1.6, 0.75);
+    assert_saves_rays(&forest(23_542, 100), 0.2, 1.5, 0.75);
 }
 
 /// Walls, pillars and beams hide whole groups of lights from whole areas.

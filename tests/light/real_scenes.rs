@@ -63,8 +63,7 @@ fn errs_only_where_the_spacing_explains_it(model: &str, lights: usize, coarsest:
     assert_eq!(scene.lights.len(), lights);
     let backend = backend(scene);
     let (exact, _) = conventional(scene, &cameras[0], settings);
-    let Spacing::Units(chosen) = settings.mesh.direct.spacing else { panic!("a spacing is chosen") };
-    let spacing = chosen * coarsest;
+    let spacing = Vec3::splat(scene.bounds().extent().length() / 120.0 * coarsest);
     let errors = [1.0f32, 0.5, 0.25].map(|part| {
         let mut settings = settings.clone();
         settings.mesh.direct.spacing = Spacing::Units(spacing * part);

@@ -44,7 +44,8 @@ fn compare_rows(world: World<BvhAccel>, surfaces: &[SurfacePoint]) {
                 let needed = mesh.view(world.lights, &shading).lookup.needed_anywhere(surfaces.iter());
                 mesh.evaluate(world, &shading, &needed);
                 let view = mesh.view(world.lights, &shading);
-                let (mut alone, mut tile) = (LookupScratch::default(), LookupScratch::for_tile());
+                // Both keep cells, whose surface points share what they see of the mesh points.
+                let (mut alone, mut tile) = (LookupScratch::for_tile(), LookupScratch::for_tile());
                 let mut lit = 0;
                 for surface in surfaces {
                     let expected = view.illumination(world.accel, surface, &mut alone);

@@ -264,3 +264,26 @@ impl Zone {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a ring begins its spacing is at most [`PIXELS`] pixels, and more than half as many where it ends; spacings are
+    /// powers of 2, whatever the scene's unit.
+    #[test]
+    fn rings_follow_the_size_of_pixels() {
+        for scale in [1e-3, 1.0, 250.0] {
+            let bounds = Bounds { min: Vec3::splat(-scale), max: Vec3::splat(3.0 * scale) };
+            let footprint = PixelFootprint { eye: Vec3::ZERO, edge: 1e-3 };
+            let levels = ring_levels(bounds, footprint);
+            assert!(levels.len() > 2);
+            for (level, next) in levels.iter().zip(&levels[1..]) {
+                assert_eq!(level.spacing.log2().fract(), 0.0);
+                let pixels = |distance: f32| level.spacing / (footprint.edge * distance);
+                assert!((pixels(level.begin) - PIXELS).abs() < 1e-3 * PIXELS);
+                assert!((pixels(next.begin) - 0.5 * PIXELS).abs() < 1e-3 * PIXELS);
+            }
+        }
+    }
+}

@@ -52,46 +52,47 @@ impl Patch {
     }
 }
 
-/// Least cosine between normals of a smooth patch.
+/// Least cosine between the normals of a smooth part.
 const SMOOTH_COSINE: f32 = 0.9;
-/// Greatest distance of its points from a plane, over its extent.
+/// Greatest distance of a point of a smooth part from the plane of another, over the distance between the two.
 const SMOOTH_HEIGHT: f32 = 0.2;
+/// Smooth parts that a patch may have: more are no surfaces, but a crowd of small things.
+const MOST_PARTS: usize = 2;
 
 /// The points that stand for all of a patch.
 ///
-/// If the points lie on one smooth surface they are the corners of the square, some of which a straight shadow edge through the
-/// patch separates from others. Else they are every other point, as on a chessboard.
+/// If the points lie on one smooth surface, or at the edge of one before another, they are the corners of each, some of which
+/// a straight shadow edge through the patch separates from others. Else they are all.
 fn corners(tile: &Tile, points: &[PathVertex]) -> LaneMask {
-    let Some(first) = points.first() else { return 0 };
-    let (normal, origin) = (first.surface.geometric_normal, first.surface.position);
-    let (mut extent, mut height, mut cosine) = (0.0f32, 0.0f32, 1.0f32);
-    for vertex in points {
-        let to: Vec3 = vertex.surface.position - origin;
-        extent = extent.max(to.length_squared());
-        height = height.max(normal.dot(to).abs());
-        cosine = cosine.min(normal.dot(vertex.surface.geometric_normal));
-    }
-    if cosine < SMOOTH_COSINE || height > SMOOTH_HEIGHT * extent.sqrt() {
-        let mut lanes = 0;
+    let mut remaining = ((1u32 << points.len()) - 1) as LaneMask;
+    let mut corners = 0;
+    for _ in 0..MOST_PARTS {
+        let Some(first) = points.get(remaining.trailing_zeros() as usize) else { break };
+        let (normal, origin) = (first.surface.geometric_normal, first.surface.position);
+        let mut part = 0;
         for (lane, vertex) in points.iter().enumerate() {
-            let is_black = (vertex.pixel % tile.width + vertex.pixel / tile.width).is_multiple_of(2);
-            lanes |= LaneMask::from(is_black) << lane;
+            let to: Vec3 = vertex.surface.position - origin;
+            let is_smooth = normal.dot(vertex.surface.geometric_normal) >= SMOOTH_COSINE
+                && normal.dot(to).abs() <= SMOOTH_HEIGHT * to.length();
+            part |= LaneMask::from(is_smooth) << lane;
         }
-        return lanes;
+        part &= remaining;
+        remaining &= !part;
+        corners |= corners_of(tile, points, part);
     }
-    // By the pixel: of those that are farthest in each of the four diagonal directions the first.
-    let farthest = |sx: i32, sy: i32| {
-        let along = |vertex: &PathVertex| {
-            let (x, y) = (vertex.pixel % tile.width, vertex.pixel / tile.width);
-            sx * x as i32 + sy * y as i32
-        };
-        let mut best = 0;
-        for lane in 1..points.len() {
-            if along(&points[lane]) > along(&points[best]) {
-                best = lane;
+    corners | remaining
+}
+
+/// The points at the corners of a part: by the pixel, those that are farthest in each of the four diagonal directions.
+fn corners_of(tile: &Tile, points: &[PathVertex], part: LaneMask) -> LaneMask {
+    let mut farthest = [(i32::MIN, 0); 4];
+    for (lane, vertex) in points.iter().enumerate().filter(|(lane, _)| part >> lane & 1 == 1) {
+        let (x, y) = ((vertex.pixel % tile.width) as i32, (vertex.pixel / tile.width) as i32);
+        for (best, along) in farthest.iter_mut().zip([x + y, x - y, y - x, -x - y]) {
+            if along > best.0 {
+                *best = (along, 1 << lane);
             }
         }
-        1 << best
-    };
-    farthest(-1, -1) | farthest(1, 1) | farthest(1, -1) | farthest(-1, 1)
+    }
+    farthest.iter().fold(0, |corners, (_, corner)| corners | corner)
 }

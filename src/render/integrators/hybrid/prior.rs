@@ -26,7 +26,8 @@ const WEAK_PART: f32 = 0.05;
 /// Lights of all patches of a tile.
 pub struct Prior<'a> {
     mesh: DirectView<'a>,
-    tolerance: f32,
+    /// What all decisions not to trace a ray may cost, as a share of a point's light.
+    pub tolerance: f32,
     /// By patch and chunk.
     lit: Vec<VisibilityBits>,
     open: Vec<VisibilityBits>,
@@ -135,6 +136,13 @@ impl<'a> Prior<'a> {
         for (anywhere, open) in self.open_anywhere.iter_mut().zip(&self.open[row..]) {
             *anywhere |= open;
         }
+    }
+
+    /// The share of open lights among those that any mesh point sees, over all patches.
+    pub fn openness(&self) -> f32 {
+        let count = |bits: &[VisibilityBits]| bits.iter().map(|bits| bits.count_ones()).sum::<u32>();
+        let (open, lit) = (count(&self.open), count(&self.lit));
+        open as f32 / (open + lit).max(1) as f32
     }
 
     /// Whether a light is open in some patch.

@@ -10,9 +10,22 @@ use crate::render::tiles::{TILE, Tile};
 use crate::render::trace::PathVertex;
 use crate::simd::{LANES, Lanes};
 
-/// Rays per patch that check what is assumed, all lights together. They are shared among the lights in proportion to what each
-/// would give the tile if nothing stood in its way; a patch gets at most one per light.
-const CHECKS: f32 = 40.0;
+/// Rays per patch that check what is assumed, all lights together, for a tolerance of [`TOLERANCE`]; they are as many more as the
+/// tolerance is smaller. They are shared among the lights in proportion to what each would give the tile if nothing
+/// stood in its way; a patch gets at most one per light.
+///
+/// The more the mesh points disagree about some lights, the less their agreement about others is worth: the number is
+/// divided by the share of lights that they agree on.
+const CHECKS: f32 = 16.0;
+/// See [`CHECKS`].
+const TOLERANCE: f32 = 0.01;
+
+/// Corners that agree stand for their patch above this tolerance.
+const MOST_WITHOUT_CORNERS: f32 = 0.005;
+
+/// Where this share of the squares around have corners that disagree, shadows are so fine that corners may agree by chance. A
+/// straight edge beside a square crosses three of the eight around it.
+const MIXED_OF: [u32; 2] = [4, 9];
 
 /// Places of a tile at which the strength of its lights is found.
 const PLACES: usize = 8;
@@ -79,7 +92,10 @@ impl<'a, A: Accel> LightTracer<'a, A> {
     pub fn trace(mut self, vertices: &[PathVertex]) -> u64 {
         let strengths = strengths(self.lights, vertices);
         let total: f32 = strengths.as_flattened().iter().sum();
-        let per_strength = CHECKS * self.patches.len() as f32 / total.max(f32::MIN_POSITIVE);
+        let agreed = 1.0 - self.prior.openness();
+        let checks = CHECKS / agreed.max(f32::MIN_POSITIVE)
+            * (TOLERANCE / self.prior.tolerance.max(f32::MIN_POSITIVE));
+        let per_strength = checks * self.patches.len() as f32 / total.max(f32::MIN_POSITIVE);
         for (index, chunk) in self.lights.chunks().iter().enumerate() {
             for light in 0..chunk.used.count_ones() as usize {
                 let hash = self.hash(index * LANES + light);
@@ -114,7 +130,12 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             *view = View { assumed, ..View::default() };
             if assumed.is_none() {
                 aim(view, &mut self.patches[number], self.lights, index, light);
-                view.wanted = view.facing & self.patches[number].corners;
+                let asked = if self.prior.tolerance > MOST_WITHOUT_CORNERS {
+                    self.patches[number].corners
+                } else {
+                    LaneMask::MAX
+                };
+                view.wanted = view.facing & asked;
                 if view.wanted == 0 {
                     view.wanted = view.facing;
                 }
@@ -130,8 +151,11 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             aim(view, &mut self.patches[number], self.lights, index, light);
             view.wanted |= any_of(view.facing & !view.wanted, hash / 7 + number * 7);
         }
+        let mut crowded = None;
         while self.trace_wanted() {
-            self.judge(index, light);
+            let first = crowded.is_none();
+            let crowded = *crowded.get_or_insert_with(|| self.crowded());
+            self.judge(index, light, if first { crowded } else { 0 });
         }
         for (number, (view, patch)) in self.views.iter().zip(&mut *self.patches).enumerate() {
             let added = match self.prior.assumption(number, index, light) {
@@ -178,16 +202,38 @@ impl<'a, A: Accel> LightTracer<'a, A> {
         !self.batch.is_empty()
     }
 
+    /// Squares among whose neighbours so many have corners that disagree that no single edge can have made them.
+    #[inline(always)]
+    fn crowded(&self) -> u64 {
+        let (mut mixed, mut squares) = (0u64, 0u64);
+        for (view, patch) in self.views.iter().zip(&*self.patches) {
+            squares |= patch.square_bit();
+            if view.assumed.is_none() && view.seeing != 0 && view.seeing != view.traced {
+                mixed |= patch.square_bit();
+            }
+        }
+        if mixed == 0 {
+            return 0;
+        }
+        let is_crowded = |square: u32| {
+            let around = Tile::around(1 << square) & !(1 << square);
+            (around & mixed).count_ones() * MIXED_OF[1] >= (around & squares).count_ones() * MIXED_OF[0]
+        };
+        (0..64)
+            .filter(|&square| squares >> square & 1 == 1 && is_crowded(square))
+            .fold(0, |mask, square| mask | 1 << square)
+    }
+
     /// Decides what the rays that were traced last ask for.
     ///
-    /// - Corners of an open patch that agree stand for all of its points.
+    /// - Corners of an open patch that agree stand for all of its points, unless the square is crowded: then all are traced.
     /// - Where a ray contradicts what was assumed, the patch's corners are asked; if they all contradict, the assumption is
     ///   turned round.
     /// - Where rays disagree, all of the patch is traced.
     /// - In both cases an edge may lie in the neighbours too, and their corners are traced. If the patch's own
     ///   corners agree, so that what was found lies between them, it is thin, and the neighbours are traced as a whole.
     #[inline(always)]
-    fn judge(&mut self, index: usize, light: usize) {
+    fn judge(&mut self, index: usize, light: usize, crowded: u64) {
         let (mut near_edges, mut near_thin) = (0, 0);
         for (view, patch) in self.views.iter_mut().zip(&*self.patches) {
             if std::mem::take(&mut view.wanted) == 0 {
@@ -211,10 +257,10 @@ impl<'a, A: Accel> LightTracer<'a, A> {
                 near_thin |= patch.square_bit();
             }
         }
-        if near_edges | near_thin == 0 {
+        if near_edges | near_thin | crowded == 0 {
             return;
         }
-        let (corners, all) = (Tile::around(near_edges), Tile::around(near_thin));
+        let (corners, all) = (Tile::around(near_edges), Tile::around(near_thin) | crowded);
         for (number, (view, patch)) in self.views.iter_mut().zip(&mut *self.patches).enumerate() {
             let square = patch.square_bit();
             if (corners | all) & square == 0

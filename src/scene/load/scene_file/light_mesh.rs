@@ -19,6 +19,7 @@ points::point_table! {
     pub struct LightMeshTable {
         estimator: Option<Estimator>,
         resolve: Option<Resolve>,
+        tolerance: Option<NonNegative>,
         indirect: Option<IndirectTable>,
     }
 }
@@ -44,6 +45,7 @@ impl LightMeshTable {
         self.point_keys("light_mesh").apply(&mut mesh.direct, &mut shading.kernel, folder, places)?;
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
         shading.resolve = self.resolve.unwrap_or(shading.resolve);
+        shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);
         // The indirect mesh's points and kernel follow from the direct one's unless its table says otherwise.
         if mesh.indirect.is_some() || self.indirect.is_some() {
             let indirect = mesh.indirect.get_or_insert_default();
