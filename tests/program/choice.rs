@@ -68,7 +68,7 @@ fn a_bare_model_is_rendered_by_what_was_chosen() {
     assert!((0.0..=stats["lights"].as_f64().expect("a number")).contains(&lights), "{lights}");
 }
 
-/// Where there are images enough for a trial, what is reported is the estimated cost of a light mesh.
+/// An image large enough for a trial is decided by the estimated cost of a light mesh, which is reported.
 #[test]
 fn a_trial_takes_what_it_estimates_to_cost_less() {
     let folder = folder(&(SCENE.to_owned() + "[light_mesh]\nresolve = \"trace\"\n"));

@@ -118,7 +118,8 @@ fn tolerances_have_one_range_and_one_meaning() {
         let mesh = "[light_mesh]\nresolve = \"trace\"\n";
         let scene = SCENE.replace("EXPOSURE", "0") + mesh;
         fs::write(folder.path().join("a.toml"), &scene).expect("writable");
-        fs::write(folder.path().join("b.toml"), format!("{scene}tolerance = {tolerance}\n")).expect("writable");
+        fs::write(folder.path().join("b.toml"), format!("{scene}tolerance = {tolerance}\n"))
+            .expect("writable");
         let render = |scene: &str, image: &str, flags: &[&str]| {
             let arguments = ["render", scene, "--quiet", "--backend", "bvh", "-o", image];
             lightmesh(folder.path(), &[&arguments[..], flags].concat()).status.code()
