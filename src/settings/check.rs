@@ -109,6 +109,7 @@ mod tests {
         assert_eq!(refused(&|s| s.view.resolution = (0, 5)), "view.resolution");
         assert_eq!(refused(&|s| s.view.samples_per_pixel = 0), "view.samples_per_pixel");
         assert_eq!(refused(&|s| s.shading.reference_samples = 0), "shading.reference_samples");
+        assert_eq!(refused(&|s| s.shading.tolerance = -0.01), "shading.tolerance");
         assert_eq!(refused(&|s| s.shading.kernel.radius = Radius::Units(f32::NAN)), "shading.kernel.radius");
         assert_eq!(refused(&|s| s.mesh.direct.spacing = Spacing::Units(Vec3::ZERO)), "points.spacing");
         assert_eq!(

@@ -154,7 +154,7 @@ named_enum! {
     pub enum Resolve {
         /// Their mean visibility: soft shadows
         Average = "average",
-        /// One occlusion ray from the surface point: the sharp shadows of `conventional`
+        /// Occlusion rays from surface points: the sharp shadows of `conventional`
         Trace = "trace",
     }
 }

@@ -107,6 +107,34 @@ fn exposures_have_one_range() {
     }
 }
 
+/// The tolerance of traced shadows is a number from 0 up, in the scene file as on the command line, and either way means the
+/// same; image files name it among their settings.
+#[test]
+fn tolerances_have_one_range_and_one_meaning() {
+    for (tolerance, accepted) in
+        [("0", true), ("0.005", true), ("2.5", true), ("-0.01", false), ("nan", false), ("inf", false)]
+    {
+        let folder = folder("0");
+        let mesh = "[light_mesh]\nresolve = \"trace\"\n";
+        let scene = SCENE.replace("EXPOSURE", "0") + mesh;
+        fs::write(folder.path().join("a.toml"), &scene).expect("writable");
+        fs::write(folder.path().join("b.toml"), format!("{scene}tolerance = {tolerance}\n"))
+            .expect("writable");
+        let render = |scene: &str, image: &str, flags: &[&str]| {
+            let arguments = ["render", scene, "--quiet", "--backend", "bvh", "-o", image];
+            lightmesh(folder.path(), &[&arguments[..], flags].concat()).status.code()
+        };
+        let code = |failure| Some(if accepted { 0 } else { failure });
+        let flag = format!("--tolerance={tolerance}");
+        assert_eq!(render("a.toml", "a.exr", &[&flag]), code(2), "{flag}");
+        assert_eq!(render("b.toml", "b.exr", &[]), code(1), "tolerance = {tolerance}");
+        if accepted {
+            let [a, b] = ["a.exr", "b.exr"].map(|name| fs::read(folder.path().join(name)).expect("an image"));
+            assert!(a == b, "{flag} is not tolerance = {tolerance}");
+        }
+    }
+}
+
 /// A reader that leaves early makes no failure, and doesn't turn a failed check into a success.
 #[cfg(unix)]
 #[test]

@@ -5,6 +5,7 @@ mod common;
 
 mod awkward;
 mod bench;
+mod choice;
 mod command_line;
 mod compare;
 mod gallery;

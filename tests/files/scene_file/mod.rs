@@ -128,7 +128,8 @@ fn exactly_the_documented_keys_are_accepted() {
     points.extend(tables.clone());
     assert_eq!(direct, points);
     let mut indirect = documented_keys(&text, "### `[light_mesh.indirect]`");
-    points.retain(|key| !["estimator", "resolve", "indirect"].contains(&key.as_str()));
+    // The indirect part documents a `tolerance` of its own.
+    points.retain(|key| !["estimator", "resolve", "tolerance", "indirect"].contains(&key.as_str()));
     indirect.extend(points);
     assert_eq!(accepted_keys("[light_mesh.indirect]"), indirect);
     let mut top = documented_keys(&text, "## Top-level keys");
@@ -186,6 +187,8 @@ fn mistakes_name_file_line_and_key() {
             "[light_mesh]\nradius = 1\nradius_in_spacings = 2",
             "2: light_mesh.radius: radius and radius_in_spacings exclude",
         ),
+        ("[light_mesh]\ntolerance = -0.01", "2: light_mesh.tolerance: must not be negative, found -0.01"),
+        ("[light_mesh]\ntolerance = nan", "2: light_mesh.tolerance: must be a finite"),
         ("[light_mesh]\nlayout_seed = 1", "2: light_mesh.layout_seed: needs layout"),
         ("[light_mesh]\npoints_file = \"none.csv\"", "2: light_mesh.points_file: cannot read"),
         ("[light_mesh.indirect]\nbounces = 0", "2: light_mesh.indirect.bounces: must lie in"),
@@ -260,6 +263,7 @@ exposure = -1.5
 [light_mesh]
 estimator = \"ratio\"
 resolve = \"trace\"
+tolerance = 0.25
 layout = \"jittered\"
 layout_seed = 9
 spacing = [1, 2, 3]
@@ -296,6 +300,7 @@ layout = \"body-centred\"
     let (mesh, shading) = (settings.mesh, settings.shading);
     let (kernel, indirect_kernel) = (&shading.kernel, &shading.indirect.kernel);
     assert_eq!((shading.estimator, shading.resolve), (Estimator::Ratio, Resolve::Trace));
+    assert_eq!(shading.tolerance, 0.25);
     assert_eq!(mesh.direct.layout, PointLayout::Jittered { seed: 9 });
     assert_eq!(mesh.direct.spacing, Spacing::Units(Vec3::new(1.0, 2.0, 3.0)));
     assert_eq!((kernel.radius, kernel.neighbourhood), (Radius::Units(4.0), Neighbourhood::Nearest));

@@ -67,7 +67,7 @@ impl<'a> Prior<'a> {
     /// Sorts the lights for the next patch, and adds to its light what needs no ray.
     ///
     /// Of the lights on which mesh points disagree the weakest are not traced, as long as what they may be wrong by sums up to no
-    /// more than `tolerance` of the light of any point.
+    /// more than [`WEAK_PART`] of `tolerance`, as a share of the light of any point.
     #[inline(always)]
     pub fn add(&mut self, patch: &mut Patch, vertices: &[PathVertex], scratch: &mut LookupScratch) {
         let Self { mesh, tolerance, witnesses, doubts, .. } = self;
