@@ -16,8 +16,9 @@ fn interior() -> LoadedScene {
     load_scene_file(&folder.path().join("interior.toml")).unwrap()
 }
 
-/// With a tolerance of 0.5 %, at which nothing but the light itself speaks for an open patch, at 1200×1200 at most 1 % of the pixels differ from the conventional ones by more than 2 % of the image's mean, and at
-/// most the given share of the conventional shadow rays is traced, those of the mesh points included.
+/// With a tolerance of 0.5 %, at which no point of an open patch speaks for another, at most 1 % of the pixels differ from the
+/// conventional ones at 1200×1200 by more than 2 % of the image's mean, and at most the given share of the conventional shadow
+/// rays is traced, those of the mesh points included.
 fn assert_saves_rays(loaded: &LoadedScene, spacing: f32, radius_in_spacings: f32, share: f64) {
     let mut settings = loaded.settings.clone();
     settings.view.resolution = (1200, 1200);
