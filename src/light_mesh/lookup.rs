@@ -23,7 +23,7 @@ pub struct Lookup<'a> {
 /// Tells whether mesh points differ so much that it matters which of them a surface point sees.
 ///
 /// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
-pub(super) trait Differ {
+pub(crate) trait Differ {
     /// Whether the points in some slots do.
     fn differ(&self, slots: &[u32]) -> bool;
 }
@@ -95,7 +95,7 @@ impl Lookup<'_> {
     /// Whether a wall stands between a cell and a mesh point is asked once, from the first surface point that has the mesh
     /// point in its D_y, and not for every pixel. Surfaces that face different ways, such as the two sides of a thin wall,
     /// don't answer for each other.
-    #[inline(never)]
+    #[inline(always)]
     fn keep_seen<A: Accel>(
         &self,
         accel: &A,

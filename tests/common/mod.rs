@@ -7,6 +7,7 @@ pub mod failed;
 pub mod soup;
 pub mod triangles;
 
+use std::io::Write as _;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -97,6 +98,23 @@ pub fn light(position: Vec3, intensity: Vec3) -> Light {
 
 pub fn camera(position: Vec3, look_at: Vec3, vertical_fov: f32) -> Camera {
     Camera { name: String::new(), position, look_at, up: Vec3::Y, vertical_fov }
+}
+
+/// A backend over a scene; `None`, and said so, for Embree where it is not installed. Where `REQUIRE_EMBREE` is set that is
+/// a failure.
+pub fn backend_if_installed(choice: BackendChoice, scene: &Scene) -> Option<Backend> {
+    match Backend::build(choice, scene) {
+        Ok(chosen) => Some(chosen.backend),
+        Err(error) => {
+            assert_eq!(choice, BackendChoice::Embree, "{error}");
+            assert!(std::env::var_os("REQUIRE_EMBREE").is_none(), "REQUIRE_EMBREE is set, but {error}");
+            let test = std::thread::current();
+            // Not println!, which the test harness swallows.
+            let _ =
+                writeln!(std::io::stderr(), "SKIPPED Embree in {}: {error}", test.name().unwrap_or_default());
+            None
+        }
+    }
 }
 
 /// Embree where it is installed, the built-in BVH elsewhere.

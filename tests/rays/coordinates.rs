@@ -10,7 +10,7 @@ use lightmesh::scene::{Camera, Falloff, Scene};
 use lightmesh::settings::{Integrator, Resolve, Spacing};
 
 use crate::common::failed::assert_images;
-use crate::common::{Builder, camera, grey, light, settings_at};
+use crate::common::{Builder, backend_if_installed, camera, grey, light, settings_at};
 
 const RESOLUTION: (u32, u32) = (96, 72);
 
@@ -31,15 +31,10 @@ fn yard(shift: Vec3, floor: f32) -> (Scene, Camera) {
 }
 
 fn backends(scene: &Scene) -> Vec<Backend> {
-    let build = |choice: BackendChoice| match Backend::build(choice, scene) {
-        Ok(chosen) => Some(chosen.backend),
-        Err(error) => {
-            assert_eq!(choice, BackendChoice::Embree, "{error}");
-            println!("skipped: {error}");
-            None
-        }
-    };
-    [BackendChoice::Embree, BackendChoice::Bvh].into_iter().filter_map(build).collect()
+    [BackendChoice::Embree, BackendChoice::Bvh]
+        .into_iter()
+        .filter_map(|choice| backend_if_installed(choice, scene))
+        .collect()
 }
 
 /// The largest relative difference at pixels around which, `margin` pixels wide, the reference has no edge: no value that

@@ -12,6 +12,7 @@ use lightmesh::crosscheck::{Options, Report, Subject, crosscheck};
 use lightmesh::sampling::SplitMix64;
 use lightmesh::scene::{Ray, Scene, TriangleMaterials, TriangleMesh};
 
+use crate::common::backend_if_installed;
 use crate::common::triangles::{HOLES, Random, mesh, scene, soup};
 
 /// A right triangle at z = 0 with legs of length `size` along x and y.
@@ -21,19 +22,10 @@ fn corner(size: f32) -> Arc<TriangleMesh> {
 
 /// Every backend that there is; where Embree is missing, that is said.
 fn backends(scene: &Scene) -> Vec<Backend> {
-    let build = |choice| Backend::build(choice, scene);
-    let mut backends: Vec<_> = [BackendChoice::Bvh, BackendChoice::BruteForce]
-        .map(|choice| build(choice).expect("needs no library").backend)
-        .into();
-    match build(BackendChoice::Embree) {
-        Ok(chosen) => backends.push(chosen.backend),
-        Err(error) if std::env::var_os("REQUIRE_EMBREE").is_some() => panic!("{error}"),
-        Err(error) => {
-            let line = format!("SKIPPED Embree's part of a test: {error}\n");
-            let _ = std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes());
-        }
-    }
-    backends
+    [BackendChoice::Embree, BackendChoice::Bvh, BackendChoice::BruteForce]
+        .into_iter()
+        .filter_map(|choice| backend_if_installed(choice, scene))
+        .collect()
 }
 
 /// The cross-check of a scene with all backends.

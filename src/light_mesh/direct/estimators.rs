@@ -26,21 +26,6 @@ pub struct FieldEstimator<'a> {
 }
 
 impl FieldEstimator<'_> {
-    /// Whether the points of D_y differ so much that a wall may stand between them.
-    #[inline(always)]
-    pub fn uncertain(&self, slots: &[u32]) -> bool {
-        match Basis::of(self.estimator) {
-            Basis::Bits => {
-                let chunks = self.lights.chunks().len();
-                lights_differ(slots.iter().map(|&slot| self.field.bits(slot, chunks)))
-            }
-            // Not a look at each light, since the cost of these must not grow with the lights.
-            basis @ (Basis::Light | Basis::Irradiance) => {
-                amounts_differ(slots.iter().map(|&slot| self.field.amount(basis, slot)))
-            }
-        }
-    }
-
     /// I(y), the direct illumination of a surface point without its k_d, from known points with weights.
     #[inline(always)]
     pub fn estimate(&self, surface: &SurfacePoint, points: &Neighbours) -> Vec3 {
@@ -92,7 +77,16 @@ impl FieldEstimator<'_> {
 impl Differ for FieldEstimator<'_> {
     #[inline(always)]
     fn differ(&self, slots: &[u32]) -> bool {
-        self.uncertain(slots)
+        match Basis::of(self.estimator) {
+            Basis::Bits => {
+                let chunks = self.lights.chunks().len();
+                lights_differ(slots.iter().map(|&slot| self.field.bits(slot, chunks)))
+            }
+            // Not a look at each light, since the cost of these must not grow with the lights.
+            basis @ (Basis::Light | Basis::Irradiance) => {
+                amounts_differ(slots.iter().map(|&slot| self.field.amount(basis, slot)))
+            }
+        }
     }
 }
 

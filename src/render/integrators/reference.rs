@@ -5,6 +5,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::{Basis, DirectField, FieldEstimator};
 use crate::light_mesh::leaks::{LeakGuard, PROBES, is_inside};
+use crate::light_mesh::lookup::Differ;
 use crate::light_mesh::points::{AutoSpacing, Kernel, MeshError, Neighbourhoods, Neighbours, PointSet};
 use crate::render::frame::BlockIntegrator;
 use crate::render::stats::{RenderStats, ShadeCounters};
@@ -112,7 +113,7 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
             surface,
             points,
             |slot| inside.get(slot as usize).is_some_and(|&inside| inside),
-            |slots| estimator.uncertain(slots),
+            |slots| estimator.differ(slots),
         );
         counters.shadow_rays += leaked.rays;
         counters.direct_fallbacks += u64::from(leaked.all_dropped);

@@ -34,8 +34,10 @@ const PLACES: usize = 8;
 const ANY_NORMAL: f32 = 0.1;
 
 /// What is known of the light in one patch.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct View {
+    /// What the mesh says.
+    prior: Assumption,
     /// Points that have the light above their horizon.
     facing: LaneMask,
     /// Points whose ray was traced.
@@ -51,6 +53,16 @@ struct View {
 }
 
 impl View {
+    /// Before any ray is traced.
+    fn new(prior: Assumption) -> Self {
+        let assumed = match prior {
+            Assumption::Lit => Some(true),
+            Assumption::Dark | Assumption::Weak => Some(false),
+            Assumption::Open => None,
+        };
+        Self { prior, facing: 0, traced: 0, seeing: 0, wanted: 0, assumed, aimed: false }
+    }
+
     /// The points that see the light, as far as is known.
     fn lit(&self) -> LaneMask {
         let assumed = if self.assumed == Some(true) { !self.traced } else { 0 };
@@ -81,7 +93,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
         patches: &'a mut [Patch],
         prior: &'a Prior<'a>,
     ) -> Self {
-        let views = vec![View::default(); patches.len()];
+        let views = vec![View::new(Assumption::Dark); patches.len()];
         let mut order: Vec<u32> = (0..patches.len() as u32).collect();
         order.sort_by_key(|&number| morton(patches[number as usize].square));
         Self { accel, lights, tile, patches, prior, views, order, batch: Vec::new(), rays: 0 }
@@ -122,13 +134,8 @@ impl<'a, A: Accel> LightTracer<'a, A> {
     #[inline(always)]
     fn trace_light(&mut self, index: usize, light: usize, checks: usize, hash: usize) {
         for (number, view) in self.views.iter_mut().enumerate() {
-            let assumed = match self.prior.assumption(number, index, light) {
-                Assumption::Lit => Some(true),
-                Assumption::Dark | Assumption::Weak => Some(false),
-                Assumption::Open => None,
-            };
-            *view = View { assumed, ..View::default() };
-            if assumed.is_none() {
+            *view = View::new(self.prior.assumption(number, index, light));
+            if view.prior == Assumption::Open {
                 aim(view, &mut self.patches[number], self.lights, index, light);
                 let asked = if self.prior.tolerance > MOST_WITHOUT_CORNERS {
                     self.patches[number].corners
@@ -144,10 +151,10 @@ impl<'a, A: Accel> LightTracer<'a, A> {
         let count = self.patches.len();
         for check in 0..checks {
             let number = (hash + check * count / checks) % count;
-            if self.prior.assumption(number, index, light) == Assumption::Weak {
+            let view = &mut self.views[number];
+            if view.prior == Assumption::Weak {
                 continue;
             }
-            let view = &mut self.views[number];
             aim(view, &mut self.patches[number], self.lights, index, light);
             view.wanted |= any_of(view.facing & !view.wanted, hash / 7 + number * 7);
         }
@@ -157,18 +164,18 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             let crowded = *crowded.get_or_insert_with(|| self.crowded());
             self.judge(index, light, if first { crowded } else { 0 });
         }
-        for (number, (view, patch)) in self.views.iter().zip(&mut *self.patches).enumerate() {
-            let added = match self.prior.assumption(number, index, light) {
-                Assumption::Lit => view.facing & !view.lit(),
-                Assumption::Weak => 0,
-                _ => view.lit(),
+        for (view, patch) in self.views.iter().zip(&mut *self.patches) {
+            // What the prior has added already is taken back where it was wrong.
+            let (changed, sign) = match view.prior {
+                Assumption::Lit => (view.facing & !view.lit(), -1.0),
+                Assumption::Weak => (0, 0.0),
+                Assumption::Dark | Assumption::Open => (view.lit(), 1.0),
             };
-            if added != 0 {
-                let sign =
-                    if self.prior.assumption(number, index, light) == Assumption::Lit { -1.0 } else { 1.0 };
-                let factors = self.lights.factors(index, light, &patch.group.points);
-                let factors: Lanes =
-                    std::array::from_fn(|lane| factors[lane] * sign * (added >> lane & 1) as f32);
+            if changed != 0 {
+                let mut factors = self.lights.factors(index, light, &patch.group.points);
+                for lane in 0..LANES {
+                    factors[lane] *= if changed >> lane & 1 == 1 { sign } else { 0.0 };
+                }
                 add_light(&mut patch.light, self.lights.intensity(index, light), &factors);
             }
         }
@@ -261,11 +268,9 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             return;
         }
         let (corners, all) = (Tile::around(near_edges), Tile::around(near_thin) | crowded);
-        for (number, (view, patch)) in self.views.iter_mut().zip(&mut *self.patches).enumerate() {
+        for (view, patch) in self.views.iter_mut().zip(&mut *self.patches) {
             let square = patch.square_bit();
-            if (corners | all) & square == 0
-                || self.prior.assumption(number, index, light) == Assumption::Weak
-            {
+            if (corners | all) & square == 0 || view.prior == Assumption::Weak {
                 continue;
             }
             aim(view, patch, self.lights, index, light);
