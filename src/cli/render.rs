@@ -111,6 +111,12 @@ fn render_to(
     if let Some(choice) = &stats.choice {
         reporter.line(&format!("note: {choice}"));
     }
+    if let Some(error) = stats.hybrid_error.share().filter(|&error| error > settings.shading.tolerance) {
+        reporter.line(&format!(
+            "warning: shadows are estimated to be wrong by {:.1} % of the light: `--integrator conventional` traces them all",
+            100.0 * error
+        ));
+    }
     seconds.paths = stats.seconds.paths;
     seconds.mesh = stats.seconds.mesh;
     seconds.shade = stats.seconds.shade;
@@ -148,6 +154,7 @@ fn render_to(
         seconds,
         integrator: stats.integrator,
         choice: stats.choice,
+        hybrid_error: stats.hybrid_error,
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,

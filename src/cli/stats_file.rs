@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::render::{Choice, MeshCounters, RayCounters};
+use crate::render::{Choice, HybridError, MeshCounters, RayCounters};
 use crate::settings::Integrator;
 
 /// Contents of the file.
@@ -30,6 +30,8 @@ pub struct StatsFile {
     pub integrator: Option<Integrator>,
     /// Why, where the integrator was `auto`.
     pub choice: Option<Choice>,
+    /// The share of the light that hybrid shadows are estimated to get wrong; null without them.
+    pub hybrid_error: HybridError,
     /// Rays by kind.
     pub rays: RayCounters,
     /// Counters of the light meshes.

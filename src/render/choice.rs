@@ -6,6 +6,7 @@
 
 use std::fmt;
 
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -14,7 +15,7 @@ use super::frame::{BlockIntegrator, Frame};
 use super::integrators::LightMeshIntegrator;
 use super::meshes::LightMeshes;
 use super::need::needed_points;
-use super::stats::{RenderStats, timed};
+use super::stats::{HybridError, RenderStats, ShadeCounters, timed};
 use super::surface_group::SurfaceGroup;
 use super::tiles::{TILE, Tile};
 use super::trace::{PathVertex, TilePaths};
@@ -43,6 +44,8 @@ pub enum Reason {
     Lights(f32),
     /// By trial: what the light mesh costs, as a share of conventional shading.
     Trial(f32),
+    /// By trial: the share of the light that the light mesh is estimated to get wrong exceeds the tolerance.
+    Mistaken(f32),
 }
 
 impl fmt::Display for Choice {
@@ -53,6 +56,9 @@ impl fmt::Display for Choice {
             Reason::Lights(lights) => write!(f, "{lights:.1} lights above the horizon of a surface point"),
             Reason::Trial(share) => {
                 write!(f, "a light mesh is estimated at {:.0} % of conventional shading", 100.0 * share)
+            }
+            Reason::Mistaken(share) => {
+                write!(f, "a light mesh is estimated to get {:.1} % of the light wrong", 100.0 * share)
             }
         }
     }
@@ -75,6 +81,9 @@ const CONVENTIONAL_POINT: f32 = 2.0;
 const HYBRID_POINT: f32 = 3.5;
 const MESH_RAY: f32 = 1.5;
 const HYBRID_RAY: f32 = 1.0;
+
+/// What a light mesh has to save, as a share of conventional shading: who is level is exact, and the estimate is one.
+const LEAST_SAVED: f32 = 0.1;
 
 /// Takes an integrator for a frame.
 ///
@@ -122,23 +131,26 @@ pub(super) fn choose<A: Accel>(
     let mut integrator = LightMeshIntegrator { world, meshes, interpolation: &interpolation };
     integrator.evaluate(&paths, stats);
     let mut shade = stats.seconds.shade;
-    let hybrid: u64 = timed(&mut shade, || {
-        tiles
-            .par_iter()
-            .zip(&paths)
-            .map(|(tile, paths)| {
-                let mut light = vec![glam::Vec3::ZERO; paths.vertices.len()];
-                integrator.shade(tile, &paths.vertices, &mut light).shadow_rays
-            })
-            .sum()
+    let tried: Vec<ShadeCounters> = timed(&mut shade, || {
+        let shade = |(tile, paths): (&Tile, &TilePaths)| {
+            integrator.shade(tile, &paths.vertices, &mut vec![Vec3::ZERO; paths.vertices.len()])
+        };
+        tiles.par_iter().zip(&paths).map(shade).collect()
     });
     stats.seconds.shade = shade;
+    let hybrid: u64 = tried.iter().map(|counters| counters.shadow_rays).sum();
     stats.rays.shadow += hybrid;
+    let mut error = HybridError::default();
+    tried.iter().for_each(|counters| error.add(counters.hybrid_error));
+    if let Some(mistaken) = error.share().filter(|&error| error > shading.tolerance) {
+        return Ok(Choice { integrator: Integrator::Conventional, reason: Reason::Mistaken(mistaken) });
+    }
     let share = (HYBRID_POINT
         + MESH_RAY * per_point * world.lights.len() as f32
         + HYBRID_RAY * hybrid as f32 / points.max(1) as f32)
         / (CONVENTIONAL_POINT + lights);
-    let integrator = if share < 1.0 { Integrator::LightMesh } else { Integrator::Conventional };
+    let integrator =
+        if share <= 1.0 - LEAST_SAVED { Integrator::LightMesh } else { Integrator::Conventional };
     Ok(Choice { integrator, reason: Reason::Trial(share) })
 }
 

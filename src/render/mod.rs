@@ -24,6 +24,8 @@ pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
 pub use session::{Session, render};
-pub use stats::{MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds};
+pub use stats::{
+    HybridError, MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds,
+};
 pub use tiles::Tile;
 pub use trace::{PathVertex, TilePaths, trace_paths};

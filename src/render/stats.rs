@@ -1,6 +1,6 @@
 //! What a render did and how long it took.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::choice::Choice;
 use crate::light_mesh::direct::DirectEvaluation;
@@ -68,12 +68,42 @@ pub struct RenderStats {
     pub rays: RayCounters,
     /// Mesh points.
     pub mesh_points: MeshCounters,
+    /// What hybrid shadows estimate of their error.
+    pub hybrid_error: HybridError,
     /// Bytes held by the light meshes afterwards.
     pub light_mesh_bytes: u64,
 }
 
+/// The error that hybrid shadows estimate of themselves, over some surface points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HybridError {
+    /// The light that is there and taken for missing, or the other way round; its unit is that of `received`.
+    pub missed: f64,
+    /// The light of the points, summed over them and the colours.
+    pub received: f64,
+}
+
+impl HybridError {
+    /// Adds the error of other points.
+    pub(super) fn add(&mut self, other: Self) {
+        self.missed += other.missed;
+        self.received += other.received;
+    }
+
+    /// As a share of the light; `None` where no point had hybrid shadows, or none had light.
+    pub fn share(&self) -> Option<f32> {
+        (self.received > 0.0).then(|| (self.missed / self.received) as f32)
+    }
+}
+
+impl Serialize for HybridError {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.share().serialize(serializer)
+    }
+}
+
 /// What shading some surface points took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShadeCounters {
     /// Occlusion rays from the surface points.
     pub shadow_rays: u64,
@@ -83,6 +113,8 @@ pub struct ShadeCounters {
     pub direct_fallbacks: u64,
     /// The same of indirect mesh points.
     pub indirect_fallbacks: u64,
+    /// The error that hybrid shadows estimate.
+    pub hybrid_error: HybridError,
 }
 
 impl RenderStats {
@@ -109,6 +141,7 @@ impl RenderStats {
         self.rays.inside += counters.inside_rays;
         self.mesh_points.direct.nearest_fallback += counters.direct_fallbacks;
         self.mesh_points.indirect.nearest_fallback += counters.indirect_fallbacks;
+        self.hybrid_error.add(counters.hybrid_error);
     }
 }
 

@@ -45,7 +45,7 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
         if interpolation.hybrid {
-            counters.shadow_rays =
+            counters =
                 shade_hybrid(accel, direct, interpolation.tolerance, tile, vertices, &mut scratch, light);
         } else {
             let mut before = Vec3::NAN;

@@ -14,6 +14,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
+use crate::render::stats::ShadeCounters;
 use crate::render::tiles::Tile;
 use crate::render::trace::PathVertex;
 
@@ -21,7 +22,7 @@ use patch::Patch;
 use prior::Prior;
 use trace::LightTracer;
 
-/// Shades surface points of a tile: fills `light` with the I of each; returns the number of rays traced towards lights.
+/// Shades surface points of a tile: fills `light` with the I of each.
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
@@ -31,17 +32,17 @@ pub(super) fn shade_hybrid<A: Accel>(
     vertices: &[PathVertex],
     scratch: &mut LookupScratch,
     light: &mut [Vec3],
-) -> u64 {
+) -> ShadeCounters {
     let lights = mesh.estimator.lights;
     if lights.is_empty() || vertices.is_empty() {
-        return 0;
+        return ShadeCounters::default();
     }
     let mut patches = Patch::cut(tile, vertices);
     let mut prior = Prior::new(mesh, tolerance);
     for patch in &mut patches {
         prior.add(patch, vertices, scratch);
     }
-    let rays = LightTracer::new(accel, lights, tile, &mut patches, &prior).trace(vertices);
+    let counters = LightTracer::new(accel, lights, tile, &mut patches, &prior).trace(vertices);
     for patch in &patches {
         let points = &mut light[patch.vertices.clone()];
         for (lane, light) in points.iter_mut().enumerate() {
@@ -49,5 +50,5 @@ pub(super) fn shade_hybrid<A: Accel>(
             *light = Vec3::from(patch.light.map(|channel| channel[lane])).max(Vec3::ZERO);
         }
     }
-    rays
+    counters
 }

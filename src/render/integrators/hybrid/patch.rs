@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::accel::LaneMask;
+use crate::lights::PackedLights;
 use crate::render::surface_group::SurfaceGroup;
 use crate::render::tiles::Tile;
 use crate::render::trace::PathVertex;
@@ -43,6 +44,26 @@ impl Patch {
             first = last;
         }
         patches
+    }
+
+    /// Adds the light of one source, which sends `intensity` times `factors` to the points.
+    #[inline(always)]
+    pub fn add_light(&mut self, intensity: [f32; 3], factors: &Lanes) {
+        for (sum, intensity) in self.light.iter_mut().zip(intensity) {
+            for lane in 0..LANES {
+                sum[lane] += intensity * factors[lane];
+            }
+        }
+    }
+
+    /// Adds the light of a source to some points, or takes it away: `sign` is 1 or -1.
+    #[inline(always)]
+    pub fn add_to(&mut self, points: LaneMask, sign: f32, lights: &PackedLights, index: usize, light: usize) {
+        let mut factors = lights.factors(index, light, &self.group.points);
+        for lane in 0..LANES {
+            factors[lane] *= if points >> lane & 1 == 1 { sign } else { 0.0 };
+        }
+        self.add_light(lights.intensity(index, light), &factors);
     }
 
     /// One bit for the square.

@@ -90,7 +90,7 @@ impl<'a> Prior<'a> {
                 let intensity = lights.intensity(index, light);
                 let mut amount: f32 = intensity.iter().sum();
                 if all >> light & 1 == 1 {
-                    add_light(&mut patch.light, intensity, &factors);
+                    patch.add_light(intensity, &factors);
                 } else {
                     let share = witnesses.share(mesh, index, light);
                     doubts.push(Doubt {
@@ -129,7 +129,7 @@ impl<'a> Prior<'a> {
                 break;
             }
             let intensity = lights.intensity(*index, *light).map(|channel| channel * share);
-            add_light(&mut patch.light, intensity, factors);
+            patch.add_light(intensity, factors);
             self.open[row + index] &= !(1 << light);
             self.weak[row + index] |= 1 << light;
         }
@@ -163,16 +163,6 @@ impl<'a> Prior<'a> {
             Assumption::Weak
         } else {
             Assumption::Dark
-        }
-    }
-}
-
-/// Adds the light of one source to sixteen points.
-#[inline(always)]
-pub fn add_light(sums: &mut [Lanes; 3], intensity: [f32; 3], factors: &Lanes) {
-    for (sum, intensity) in sums.iter_mut().zip(intensity) {
-        for lane in 0..LANES {
-            sum[lane] += intensity * factors[lane];
         }
     }
 }
