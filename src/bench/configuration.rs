@@ -69,11 +69,24 @@ impl Configuration {
 
     /// The settings of what it approximates.
     pub fn reference(&self, base: &Settings, resolution: (u32, u32), samples: u32) -> Settings {
-        let mut settings = self.settings(base, resolution);
-        settings.shading.integrator = Integrator::Reference;
-        settings.shading.reference_samples = samples;
-        settings
+        reference(&self.settings(base, resolution), samples)
     }
+}
+
+/// The settings of what a light mesh approximates.
+pub fn reference(settings: &Settings, samples: u32) -> Settings {
+    let mut settings = settings.clone();
+    settings.shading.integrator = Integrator::Reference;
+    settings.shading.reference_samples = samples;
+    settings
+}
+
+/// The settings that the scene has, with its light mesh.
+pub fn as_it_is(base: &Settings, resolution: (u32, u32)) -> Settings {
+    let mut settings = base.clone();
+    settings.view.resolution = resolution;
+    settings.shading.integrator = Integrator::LightMesh;
+    settings
 }
 
 /// The settings of conventional tracing.

@@ -1,7 +1,7 @@
 //! The paper's comparison: one forest, by light mesh and by conventional tracing.
 
-use super::configuration::{Configuration, conventional};
-use super::curve::{self, Tried, fastest_within, reference_image};
+use super::configuration::{Configuration, as_it_is, conventional, reference};
+use super::curve::{self, Tried, fastest_within};
 use super::report::{Aim, Goal, Report, Table};
 use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, forest, new_report, relative_rmse};
 use super::timing::Samples;
@@ -22,6 +22,9 @@ const CASES: [CaseGoals; 3] = [
 
 /// Errors that the two meshes may have.
 const LIMITS: [f64; 2] = [0.10, 0.05];
+
+/// The light mesh of somebody who sets nothing.
+const AS_GENERATED: &str = "light mesh, nothing set";
 
 /// Runs the comparison.
 pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchError> {
@@ -55,9 +58,8 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
         log(&format!("{side}×{side} with {case_lights} lights"));
         let case = Case { setup, backend: &backend, side, lights: case_lights };
         case.compare(&configurations, goals, camera_goal, options, &mut report)?;
-        if case_lights != lights {
-            case.errors(&configurations, options, &mut report)?;
-        }
+        let others: &[Configuration] = if case_lights == lights { &[] } else { &configurations };
+        case.errors(others, options, &mut report)?;
     }
     Ok(report)
 }
@@ -98,6 +100,7 @@ impl Case<'_> {
             let name = format!("light mesh ≤ {:.0} % ({configuration})", 100.0 * limit);
             (name, configuration.settings(base, resolution))
         }));
+        variants.push((AS_GENERATED.to_owned(), as_it_is(base, resolution)));
         // Pages and caches are warm for all, or for none.
         for (_, settings) in &variants[1..] {
             self.setup.frame(self.backend, settings)?;
@@ -155,7 +158,7 @@ impl Case<'_> {
         }
     }
 
-    /// Own errors with other lights than those that the configurations were chosen for.
+    /// Own errors of the scene as generated, and of configurations that were chosen for other lights.
     fn errors(
         &self,
         configurations: &[Configuration],
@@ -163,12 +166,18 @@ impl Case<'_> {
         report: &mut Report,
     ) -> Result<(), BenchError> {
         let (side, samples) = if options.quick { (8, 16) } else { (24, 128) };
-        let mut table = Table::new(format!("Own error with {} lights", self.lights), &["", "error %"]);
-        for configuration in configurations {
-            let reference = reference_image(self.setup, self.backend, configuration, side, samples)?;
-            let settings = configuration.settings(&self.setup.settings, (side, side));
-            let error = relative_rmse(&self.setup.frame(self.backend, &settings)?.image, &reference);
-            table.rows.push(vec![configuration.to_string(), format!("{:.2}", 100.0 * error)]);
+        let base = &self.setup.settings;
+        let mut variants = vec![(AS_GENERATED.to_owned(), as_it_is(base, (side, side)))];
+        variants.extend(
+            configurations
+                .iter()
+                .map(|configuration| (configuration.to_string(), configuration.settings(base, (side, side)))),
+        );
+        let mut table = Table::new(format!("Own error: {}", self.name()), &["", "error %"]);
+        for (name, settings) in variants {
+            let exact = self.setup.frame(self.backend, &reference(&settings, samples))?.image;
+            let error = relative_rmse(&self.setup.frame(self.backend, &settings)?.image, &exact);
+            table.rows.push(vec![name, format!("{:.2}", 100.0 * error)]);
         }
         report.tables.push(table);
         Ok(())
