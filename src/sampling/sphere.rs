@@ -2,9 +2,9 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 
-use super::hash::mix;
+use super::hash::{hash_to_unit_cube, mix};
 
 /// A partition of the sphere into `N` parts of equal area: zones of equal-area cells.
 ///
@@ -58,6 +58,11 @@ impl SphereStrata {
         Vec3::new(r * phi.cos(), r * phi.sin(), z)
     }
 
+    /// The middle of each part.
+    pub fn middles(&self) -> Vec<Vec3> {
+        (0..self.len()).map(|cell| self.direction(cell, 0.5, 0.5)).collect()
+    }
+
     /// The direction of part `cell` for the mesh point at `x`: jittered by a hash of the two, so that the result depends
     /// on nothing else.
     #[inline(always)]
@@ -70,6 +75,16 @@ impl SphereStrata {
         let v = (h >> 8 & 0xff_ffff) as f32 / (1u32 << 24) as f32;
         self.direction(cell, u, v)
     }
+}
+
+/// A rotation that belongs to a position; over all positions, all rotations are equally likely (Shoemake, "Uniform random
+/// rotations", 1992).
+pub fn rotation_at(x: Vec3) -> Mat3 {
+    let noise = hash_to_unit_cube(x);
+    let (low, high) = ((1.0 - noise.x).sqrt(), noise.x.sqrt());
+    let (sin_a, cos_a) = (2.0 * PI * noise.y).sin_cos();
+    let (sin_b, cos_b) = (2.0 * PI * noise.z).sin_cos();
+    Mat3::from_quat(Quat::from_xyzw(low * sin_a, low * cos_a, high * sin_b, high * cos_b))
 }
 
 #[cfg(test)]

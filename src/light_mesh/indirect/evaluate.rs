@@ -6,7 +6,8 @@ use super::mesh::IndirectMesh;
 use crate::accel::Accel;
 use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
 use crate::light_mesh::store::PointMask;
-use crate::settings::Leaks;
+use crate::scene::SurfacePoint;
+use crate::settings::{IndirectForm, Leaks};
 use crate::world::World;
 
 /// What the evaluation of indirect mesh points took.
@@ -55,17 +56,27 @@ impl IndirectMesh {
             }
             evaluation.evaluated += new.len() as u64;
             evaluation.rays += hits.len() as u64;
-            let lookup = direct.view(world.lights, transport.interpolation).lookup;
-            let direct_needed = self.needed_at(world.scene, &new, &hits, lookup);
-            evaluation.direct_needed += direct_needed.len();
-            evaluation.direct.add(direct.evaluate(world, transport.interpolation, &direct_needed));
+            if self.settings.form == IndirectForm::Scalar {
+                let lookup = direct.view(world.lights, transport.interpolation).lookup;
+                let direct_needed = self.needed_at(world.scene, &new, &hits, lookup);
+                evaluation.direct_needed += direct_needed.len();
+                evaluation.direct.add(direct.evaluate(world, transport.interpolation, &direct_needed));
+            }
+            let known = gathering.patches.patches.len();
+            // A quarter of R: a fraction of what the mean over D_y blurs.
+            let finest =
+                |surface: &SurfacePoint| 0.25 * interpolation.neighbourhoods.radius_at(surface.position);
+            self.sort_hits(world, &mut gathering, &new, &hits, finest);
             needed = if self.settings.bounces > 1 {
-                self.needed_at(world.scene, &new, &hits, self.view(interpolation).lookup)
+                let surfaces = gathering.patches.patches[known..].iter().map(|patch| &patch.surface);
+                self.view(interpolation).lookup.needed_anywhere(surfaces)
             } else {
                 PointMask::default()
             };
             gathering.points.extend(new);
-            gathering.hits.extend(hits);
+            if self.settings.form == IndirectForm::Scalar {
+                gathering.hits.extend(hits);
+            }
         }
         if leaks == Leaks::Invalidate {
             evaluation.inside += self.store.find_inside(world.accel, world.scene, usize::MAX);

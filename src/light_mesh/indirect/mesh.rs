@@ -1,5 +1,7 @@
 //! The indirect light mesh: its points, and the light that is known at them.
 
+use glam::Vec3;
+
 use super::interpolation::IndirectInterpolation;
 use super::octahedral::ENTRIES;
 use crate::Bounds;
@@ -11,7 +13,8 @@ use crate::settings::{IndirectForm, IndirectSettings, IndirectShading};
 /// Indirect light mesh.
 pub struct IndirectMesh {
     pub(super) store: PointStore,
-    pub(super) strata: SphereStrata,
+    /// Directions of rays, before each point turns them its own way.
+    pub(super) directions: Vec<Vec3>,
     pub(super) settings: IndirectSettings,
     /// IndirectLight by slot, [`IndirectMesh::entries`] each, as means over directions; the first is that of all light.
     pub(super) values: Vec<[f32; 3]>,
@@ -22,7 +25,7 @@ impl IndirectMesh {
     pub fn new(bounds: Bounds, settings: &IndirectSettings) -> Self {
         Self {
             store: PointStore::new(PointSet::new(bounds)),
-            strata: SphereStrata::new(settings.directions),
+            directions: SphereStrata::new(settings.directions).middles(),
             settings: settings.clone(),
             values: Vec::new(),
         }

@@ -5,16 +5,16 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::direct_light::DirectLight;
 use super::gather::{Gathering, POINTS_PER_TASK};
 use super::interpolation::{DirectTransport, IndirectInterpolation};
 use super::mesh::IndirectMesh;
 use super::octahedral::IrradianceSums;
-use super::patches::Patches;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::lookup::LookupScratch;
-use crate::sampling::hash_to_unit_cube;
-use crate::scene::{Ray, SurfacePoint};
+use crate::sampling::{hash_to_unit_cube, rotation_at};
+use crate::scene::Ray;
 use crate::settings::IndirectForm;
 use crate::world::World;
 
@@ -29,38 +29,51 @@ impl IndirectMesh {
         interpolation: &IndirectInterpolation,
         gathering: &Gathering,
     ) -> u64 {
-        let World { accel, scene, lights, emissive } = world;
-        let direct = direct.view(lights, transport.interpolation);
+        let World { accel, scene, lights, .. } = world;
         let first = self.values.len();
-        let directions = self.strata.len() as usize;
-        let (one_bounce, mut rays) = self.sweep(gathering, |point, sums, scratch| {
-            let (x, hits) = (gathering.points[point], &gathering.hits[point * directions..][..directions]);
-            self.for_each_hit(scene, x, hits, |cell, direction, surface| {
-                let light = surface.map_or(scene.background, |surface| {
-                    let illumination = direct.illumination(accel, &surface.point, scratch) * transport.scale;
-                    let share = match &hits[cell] {
-                        Some(hit) if surface.emission != Vec3::ZERO => {
-                            self.mis_weight(emissive.pdf(scene, x, hit, &surface.point))
-                        }
-                        _ => 1.0,
-                    };
-                    surface.emission * share + surface.diffuse * illumination
-                });
+        let patches = &gathering.patches;
+        let emitted = |point: usize, sums: &mut IrradianceSums, scratch: &mut LookupScratch| {
+            for &(direction, light) in &gathering.emitted[point] {
                 self.accumulate(sums, direction, light);
+            }
+            scratch.rays += self.add_emissive(world, gathering.points[point], sums);
+        };
+        let (one_bounce, mut rays) = if self.settings.form == IndirectForm::Scalar {
+            let direct = direct.view(lights, transport.interpolation);
+            let directions = self.directions.len();
+            self.sweep(gathering, |point, sums, scratch| {
+                let (x, hits) =
+                    (gathering.points[point], &gathering.hits[point * directions..][..directions]);
+                self.for_each_hit(scene, x, hits, |direction, hit| {
+                    let light = hit.map_or(scene.background, |(_, surface)| {
+                        surface.diffuse
+                            * direct.illumination(accel, &surface.point, scratch)
+                            * transport.scale
+                    });
+                    self.accumulate(sums, direction, light);
+                });
+                emitted(point, sums, scratch);
+            })
+        } else {
+            let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
+                .patches
+                .par_iter()
+                .map_init(DirectLight::default, |direct, patch| {
+                    direct.rays = 0;
+                    let light = direct.at(accel, lights, &patch.surface) * transport.scale;
+                    (patch.diffuse() * light, direct.rays)
+                })
+                .unzip();
+            let (values, rays) = self.sweep(gathering, |point, sums, scratch| {
+                self.add_patches(gathering, point, &radiance, scene.background, sums);
+                emitted(point, sums, scratch);
             });
-            scratch.rays += self.add_emissive(world, x, sums);
-        });
+            (values, rays + traced.iter().sum::<u64>())
+        };
         self.values.extend_from_slice(&one_bounce);
         if self.settings.bounces == 1 {
             return rays;
         }
-        // A quarter of R: a fraction of what the mean over D_y blurs.
-        let width = |surface: &SurfacePoint| 0.25 * interpolation.neighbourhoods.radius_at(surface.position);
-        let patches = Patches::new(gathering.hits.len(), width, |hit| {
-            let x = gathering.points[hit / directions];
-            let direction = self.strata.jittered((hit % directions) as u32, x);
-            gathering.hits[hit].as_ref().map(|hit| scene.interaction(hit, direction))
-        });
         let peak =
             |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
         for _ in 1..self.settings.bounces {
@@ -70,17 +83,12 @@ impl IndirectMesh {
                 .par_iter()
                 .map_init(LookupScratch::default, |scratch, patch| {
                     scratch.rays = 0;
-                    (patch.diffuse * view.illumination(accel, &patch.surface, scratch), scratch.rays)
+                    (patch.diffuse() * view.illumination(accel, &patch.surface, scratch), scratch.rays)
                 })
                 .unzip();
             rays += traced.iter().sum::<u64>();
             let (mut next, _) = self.sweep(gathering, |point, sums, _| {
-                let x = gathering.points[point];
-                for cell in 0..directions {
-                    if let Some(patch) = patches.of(point * directions + cell) {
-                        self.accumulate(sums, self.strata.jittered(cell as u32, x), radiance[patch]);
-                    }
-                }
+                self.add_patches(gathering, point, &radiance, Vec3::ZERO, sums);
             });
             let flat = next.as_flattened_mut();
             flat.iter_mut().zip(one_bounce.as_flattened()).for_each(|(value, first)| *value += first);
@@ -97,14 +105,32 @@ impl IndirectMesh {
         rays
     }
 
+    /// Adds what patches send to a point along its rays, given the radiance of each patch, and of where no surface is.
+    #[inline(always)]
+    fn add_patches(
+        &self,
+        gathering: &Gathering,
+        point: usize,
+        radiance: &[Vec3],
+        background: Vec3,
+        sums: &mut IrradianceSums,
+    ) {
+        let rotation = rotation_at(gathering.points[point]);
+        let count = self.directions.len();
+        for (&direction, &patch) in self.directions.iter().zip(&gathering.patches.of_ray[point * count..]) {
+            let light = radiance.get(patch as usize).copied().unwrap_or(background);
+            self.accumulate(sums, rotation * direction, light);
+        }
+    }
+
     /// MIS weight of rays that could find a point on an emissive triangle: the share of the directions of eq. (4) in the pdf of
     /// all such rays, the others being chosen with a pdf of `pdf` each.
     #[inline(always)]
-    fn mis_weight(&self, pdf: f32) -> f32 {
+    pub(super) fn mis_weight(&self, pdf: f32) -> f32 {
         if self.settings.emitter_samples == 0 {
             return 1.0;
         }
-        let ours = self.strata.len() as f32 / (4.0 * PI);
+        let ours = self.directions.len() as f32 / (4.0 * PI);
         ours / (ours + self.settings.emitter_samples as f32 * pdf)
     }
 
@@ -148,7 +174,7 @@ impl IndirectMesh {
         gather: impl Fn(usize, &mut IrradianceSums, &mut LookupScratch) + Sync,
     ) -> (Vec<[f32; 3]>, u64) {
         let entries = self.entries();
-        let directions = self.strata.len() as f32;
+        let directions = self.directions.len() as f32;
         let mut values = vec![[0.0f32; 3]; gathering.points.len() * entries];
         let rays = values
             .par_chunks_mut(entries)
