@@ -1,5 +1,7 @@
 //! Direct light of surfaces that indirect mesh points see.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
@@ -20,12 +22,22 @@ pub struct DirectLight {
 }
 
 impl DirectLight {
-    /// I at a surface point: Σ_i V_i · φ2 · E_i / φ1.
+    /// I at a surface point that stands for a square around it of the given width: Σ_i V_i · φ2 · E_i / φ1.
+    ///
+    /// Close to a light that single point may get many times what the square does on average. At the foot of a light with inverse-square
+    /// falloff a disc of area w² gets as much as from a distance of w/√2π, as the light comes down to it; so distances d
+    /// count as (d⁴ + (w²/2π)²)^¼, which changes them by a thousandth from 2 w on.
     ///
     /// Where more than 16 lights lie above the horizon, 16 rays are dealt out among them in proportion to what each would give, at equal
     /// steps through their sum from a start that belongs to the position, so that the mean over all starts is I.
     #[inline(always)]
-    pub fn at<A: Accel>(&mut self, accel: &A, lights: &PackedLights, surface: &SurfacePoint) -> Vec3 {
+    pub fn at<A: Accel>(
+        &mut self,
+        accel: &A,
+        lights: &PackedLights,
+        surface: &SurfacePoint,
+        width: f32,
+    ) -> Vec3 {
         self.unoccluded.clear();
         lights.incident_at(
             surface.position,
@@ -57,9 +69,14 @@ impl DirectLight {
         }
         let mut packet = RayPacket::<LANES>::empty();
         let (origin, mut active): (_, LaneMask) = (surface.ray_origin(), 0);
-        for (lane, &(light, _)) in self.chosen.iter().enumerate() {
-            let chunk = &lights.chunks()[light / LANES];
-            let way = Vec3::from_array(chunk.to_light(light % LANES, origin.to_array()));
+        let near = width * width / (2.0 * PI);
+        for (lane, (light, factor)) in self.chosen.iter_mut().enumerate() {
+            let chunk = &lights.chunks()[*light / LANES];
+            let way = Vec3::from_array(chunk.to_light(*light % LANES, origin.to_array()));
+            let squared = way.length_squared();
+            if near > 0.0 && squared < 1e3 * near {
+                *factor *= squared / squared.hypot(near);
+            }
             packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
             active |= 1 << lane;
         }
@@ -104,14 +121,63 @@ impl IncidentLights for Unoccluded<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::BruteForce;
+    use crate::accel::BruteForceAccel;
     use crate::lights::Unoccluded as AllSeen;
-    use crate::scene::{Falloff, Light};
+    use crate::scene::{Falloff, Light, Scene};
 
     fn lights(count: usize) -> PackedLights {
         let at = |i: usize| Vec3::new((i % 7) as f32 - 3.0, 1.0 + (i % 3) as f32, (i / 7) as f32 - 2.0);
         let lights: Vec<Light> =
             (0..count).map(|i| Light::point(at(i), Vec3::new(1.0, 0.5, (i % 4) as f32))).collect();
         PackedLights::new(&lights, Falloff::InverseSquare, 0.0)
+    }
+
+    fn nothing() -> BruteForceAccel {
+        BruteForceAccel::new(&Scene::default())
+    }
+
+    /// Of up to 16 lights above the horizon each has its ray, and none that is below it.
+    #[test]
+    fn few_lights_are_summed_exactly() {
+        let (accel, lights) = (nothing(), lights(16));
+        for normal in [Vec3::Y, Vec3::X, Vec3::NEG_Y] {
+            let surface = SurfacePoint::flat(Vec3::new(0.1, 0.0, 0.2), normal);
+            let mut direct = DirectLight::default();
+            let found = direct.at(&accel, &lights, &surface, 0.0);
+            assert!(found.abs_diff_eq(lights.irradiance(&surface, AllSeen), 1e-4), "{normal}: {found}");
+        }
+        let below = SurfacePoint::flat(Vec3::ZERO, Vec3::NEG_Y);
+        let mut direct = DirectLight::default();
+        assert_eq!((direct.at(&accel, &lights, &below, 0.0), direct.rays), (Vec3::ZERO, 0));
+    }
+
+    /// Of many lights 16 rays make an estimate whose mean over many places is that of the sum of all.
+    #[test]
+    fn many_lights_are_summed_on_average() {
+        let (accel, lights) = (nothing(), lights(60));
+        let (mut found, mut expected, mut direct) = (Vec3::ZERO, Vec3::ZERO, DirectLight::default());
+        for i in 0..2000 {
+            let surface = SurfacePoint::flat(Vec3::new(1e-5 * i as f32, 0.0, 0.0), Vec3::Y);
+            found += direct.at(&accel, &lights, &surface, 0.0);
+            expected += lights.irradiance(&surface, AllSeen);
+        }
+        assert!(direct.rays <= 2000 * 16);
+        assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found} for {expected}");
+    }
+
+    /// At the foot of a lamp, low above the floor, a point gets what a disc around it gets on average: 2I/a² · (1 − h/√(h² + a²)), with
+    /// area πa² = w².
+    #[test]
+    fn close_to_a_light_the_mean_of_the_square_counts() {
+        let width = 0.4f32;
+        for height in [0.001f32, 0.01, 2.0] {
+            let lamp = Light::point(Vec3::new(0.0, height, 0.0), Vec3::ONE);
+            let lights = PackedLights::new(&[lamp], Falloff::InverseSquare, 0.0);
+            let floor = SurfacePoint::flat(Vec3::ZERO, Vec3::Y);
+            let found = DirectLight::default().at(&nothing(), &lights, &floor, width).x;
+            let squared = width * width / PI;
+            let expected = 2.0 / squared * (1.0 - height / (height * height + squared).sqrt());
+            assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected} at {height}");
+        }
     }
 }

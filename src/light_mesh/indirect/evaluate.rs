@@ -10,6 +10,9 @@ use crate::scene::SurfacePoint;
 use crate::settings::{IndirectForm, Leaks};
 use crate::world::World;
 
+/// Width of patches over R: half of what the mean over D_y blurs.
+const PATCH_WIDTH: f32 = 0.5;
+
 /// What the evaluation of indirect mesh points took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct IndirectEvaluation {
@@ -21,7 +24,7 @@ pub struct IndirectEvaluation {
     pub direct_needed: u64,
     /// Evaluation of those that were unknown.
     pub direct: DirectEvaluation,
-    /// Occlusion rays towards emissive triangles and against leaks.
+    /// Occlusion rays from what its points see towards lights, from them towards emissive triangles, and against leaks.
     pub shadow: u64,
     /// Rays that look for back faces around points that were known before.
     pub inside: u64,
@@ -62,14 +65,13 @@ impl IndirectMesh {
                 evaluation.direct_needed += direct_needed.len();
                 evaluation.direct.add(direct.evaluate(world, transport.interpolation, &direct_needed));
             }
-            let known = gathering.patches.patches.len();
-            // A quarter of R: a fraction of what the mean over D_y blurs.
-            let finest =
-                |surface: &SurfacePoint| 0.25 * interpolation.neighbourhoods.radius_at(surface.position);
-            self.sort_hits(world, &mut gathering, &new, &hits, finest);
+            let known = self.patches.len();
+            let width = |surface: &SurfacePoint| {
+                PATCH_WIDTH * interpolation.neighbourhoods.radius_at(surface.position)
+            };
+            evaluation.shadow += self.sort_hits(world, &mut gathering, &new, &hits, width);
             needed = if self.settings.bounces > 1 {
-                let surfaces = gathering.patches.patches[known..].iter().map(|patch| &patch.surface);
-                self.view(interpolation).lookup.needed_anywhere(surfaces)
+                self.view(interpolation).lookup.needed_anywhere(self.patches.surfaces(known))
             } else {
                 PointMask::default()
             };

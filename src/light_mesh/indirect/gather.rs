@@ -4,7 +4,7 @@ use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::mesh::IndirectMesh;
-use super::patches::Patches;
+use super::patches::{NO_PATCH, PatchCell, PatchCells};
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::leaks::is_inside_by_share;
 use crate::light_mesh::lookup::Lookup;
@@ -21,17 +21,47 @@ pub struct Gathering {
     pub points: Vec<Vec3>,
     /// What surfaces emit towards a point, by point: direction and light, times the MIS weight.
     pub emitted: Vec<Vec<(Vec3, Vec3)>>,
-    /// The patches that the rays hit.
-    pub patches: Patches,
+    /// N per point.
+    pub rays: Vec<GatheredRay>,
     /// N hits per point, where each is looked up by itself.
     pub hits: Vec<Option<Hit>>,
+}
+
+/// What a ray found.
+#[derive(Clone, Copy, Debug)]
+pub struct GatheredRay {
+    /// Number of the patch, or [`NO_PATCH`].
+    pub patch: u32,
+    /// k_d there, three numbers of 10 bits: there are millions of rays.
+    diffuse: u32,
+}
+
+impl GatheredRay {
+    /// Steps from 0 to 1.
+    const STEPS: f32 = 1023.0;
+
+    #[inline(always)]
+    fn new(patch: u32, diffuse: Vec3) -> Self {
+        let [r, g, b] = (diffuse * Self::STEPS + 0.5).to_array().map(|step| (step as u32).min(1023));
+        Self { patch, diffuse: r | g << 10 | b << 20 }
+    }
+
+    /// k_d where the ray ended.
+    #[inline(always)]
+    pub fn diffuse(self) -> Vec3 {
+        let part = |shift: u32| (self.diffuse >> shift & 1023) as f32 * (1.0 / Self::STEPS);
+        Vec3::new(part(0), part(10), part(20))
+    }
 }
 
 /// Mesh points per parallel task: with N = 256 some hundred microseconds of rays.
 pub const POINTS_PER_TASK: usize = 4;
 
-/// Width of a patch that is seen from afar, over the distance between neighbouring rays there.
-const PATCH_PER_RAY: f32 = 0.5;
+/// Mesh points whose hits are sorted by themselves: so many that most patches are found more than once.
+const POINTS_PER_PART: usize = 32;
+
+/// Width of the patches that are tried where no point can stand for a patch.
+const SMALLER_PATCH: f32 = 0.25;
 
 impl IndirectMesh {
     /// What each of the points sees in each of its directions.
@@ -90,47 +120,78 @@ impl IndirectMesh {
         .collect()
     }
 
-    /// Sorts the hits of new points into patches; `finest` is the least width of a patch at a surface point.
-    ///
-    /// Where rays lie far apart, patches are as much wider, by a power of 2, so that all points have the same few widths.
+    /// Sorts the hits of new points into patches; `width` is that of a patch at a surface point. Returns the number of occlusion
+    /// rays.
     pub(super) fn sort_hits<A: Accel>(
-        &self,
+        &mut self,
         world: World<A>,
         gathering: &mut Gathering,
         points: &[Vec3],
         hits: &[Option<Hit>],
-        finest: impl Fn(&SurfacePoint) -> f32 + Sync,
-    ) {
+        width: impl Fn(&SurfacePoint) -> f32 + Sync,
+    ) -> u64 {
         let World { scene, emissive, .. } = world;
         let directions = self.directions.len();
-        let apart = PATCH_PER_RAY * (4.0 * std::f32::consts::PI / directions as f32).sqrt();
+        let this = &*self;
         let sorted: Vec<_> = points
-            .par_chunks(POINTS_PER_TASK)
-            .zip(hits.par_chunks(directions * POINTS_PER_TASK))
+            .par_chunks(POINTS_PER_PART)
+            .zip(hits.par_chunks(directions * POINTS_PER_PART))
             .with_max_len(1)
             .map(|(points, hits)| {
-                let (mut patches, mut emitted) = (Patches::default(), Vec::with_capacity(points.len()));
+                let mut cells = PatchCells::default();
+                let mut rays = Vec::with_capacity(hits.len());
+                let mut emitted = Vec::with_capacity(points.len());
                 for (&x, hits) in points.iter().zip(hits.chunks(directions)) {
                     let mut towards_x = Vec::new();
-                    self.for_each_hit(scene, x, hits, |direction, hit| {
-                        let Some((hit, surface)) = hit else { return patches.push(None) };
-                        let finest = finest(&surface.point);
-                        let coarser = (apart * hit.t / finest).max(1.0).log2().floor().exp2();
-                        patches.push(Some((&surface, finest * coarser)));
+                    this.for_each_hit(scene, x, hits, |direction, hit| {
+                        let Some((hit, surface)) = hit else {
+                            return rays.push(GatheredRay::new(NO_PATCH, Vec3::ZERO));
+                        };
+                        let number = cells.number(PatchCell::of(&surface.point, width(&surface.point)));
+                        rays.push(GatheredRay::new(number, surface.diffuse));
                         if surface.emission != Vec3::ZERO {
-                            let share = self.mis_weight(emissive.pdf(scene, x, hit, &surface.point));
+                            let share = this.mis_weight(emissive.pdf(scene, x, hit, &surface.point));
                             towards_x.push((direction, surface.emission * share));
                         }
                     });
                     emitted.push(towards_x);
                 }
-                (patches, emitted)
+                (cells, rays, emitted)
             })
             .collect();
-        for (patches, emitted) in sorted {
-            gathering.patches.extend(patches);
+        let first = gathering.rays.len();
+        for (cells, rays, emitted) in sorted {
+            let numbers: Vec<u32> = cells.cells.into_iter().map(|cell| self.patches.number(cell)).collect();
+            let renumbered = rays.into_iter().map(|ray| {
+                let patch = numbers.get(ray.patch as usize).copied().unwrap_or(NO_PATCH);
+                GatheredRay { patch, ..ray }
+            });
+            gathering.rays.extend(renumbered);
             gathering.emitted.extend(emitted);
         }
+        let mut occlusion = self.patches.find_points(world);
+        // Hits in cells whose surface no point stands for are sorted into smaller cells, and at last stand for themselves.
+        for share in [Some(SMALLER_PATCH), None] {
+            let homeless: Vec<(usize, SurfacePoint)> = gathering.rays[first..]
+                .par_iter()
+                .zip(hits)
+                .enumerate()
+                .filter_map(|(number, (ray, hit))| {
+                    let hit = hit.as_ref().filter(|_| !self.patches.has_point(ray.patch))?;
+                    let x = points[number / directions];
+                    let direction = rotation_at(x) * self.directions[number % directions];
+                    Some((first + number, scene.interaction(hit, direction).point))
+                })
+                .collect();
+            for (number, surface) in homeless {
+                gathering.rays[number].patch = match share {
+                    Some(share) => self.patches.number(PatchCell::of(&surface, share * width(&surface))),
+                    None => self.patches.number_of_point(surface),
+                };
+            }
+            occlusion += self.patches.find_points(world);
+        }
+        occlusion
     }
 
     /// The points of a mesh that lie in the neighbourhoods of the hits.

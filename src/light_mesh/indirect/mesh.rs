@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::interpolation::IndirectInterpolation;
 use super::octahedral::ENTRIES;
+use super::patches::Patches;
 use crate::Bounds;
 use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointSet};
 use crate::light_mesh::store::PointStore;
@@ -16,6 +17,8 @@ pub struct IndirectMesh {
     /// Directions of rays, before each point turns them its own way.
     pub(super) directions: Vec<Vec3>,
     pub(super) settings: IndirectSettings,
+    /// What its points see.
+    pub(super) patches: Patches,
     /// IndirectLight by slot, [`IndirectMesh::entries`] each, as means over directions; the first is that of all light.
     pub(super) values: Vec<[f32; 3]>,
 }
@@ -27,6 +30,7 @@ impl IndirectMesh {
             store: PointStore::new(PointSet::new(bounds)),
             directions: SphereStrata::new(settings.directions).middles(),
             settings: settings.clone(),
+            patches: Patches::default(),
             values: Vec::new(),
         }
     }
@@ -58,9 +62,11 @@ impl IndirectMesh {
         &self.store
     }
 
-    /// Bytes held by slots and values.
+    /// Bytes held by slots, values and patches.
     pub fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes() + self.values.capacity() * size_of::<[f32; 3]>()
+        self.store.memory_bytes()
+            + self.patches.memory_bytes()
+            + self.values.capacity() * size_of::<[f32; 3]>()
     }
 
     /// The values of the point in a slot.

@@ -11,6 +11,7 @@ mod interpolation;
 mod mesh;
 mod octahedral;
 mod patches;
+mod series;
 mod solve;
 mod view;
 

@@ -1,94 +1,216 @@
 //! Patches: what indirect mesh points see of the surfaces, once for all that see the same.
 //!
-//! Millions of rays from mesh points end on surfaces that hold a few thousand points' worth of light. Hits that lie
-//! near to each other, for how far the rays came, and face the same way form a patch; what it sends back is found once, at one
-//! hit of it. The mean over a point's directions and the interpolation over D_y blur that light more than the patch does.
+//! Millions of rays from mesh points end on surfaces that hold a few thousand points' worth of light. Space is cut into cells;
+//! the surface that faces about one way in one cell is a patch, and the light that falls on it is found once, at one point of
+//! it. The mean over a mesh point's directions and the interpolation over D_y blur that light more than the patch does.
+//!
+//! The point of a patch follows from cell and normal alone, not from who saw it: so values of mesh points depend on their positions
+//! alone, as ever.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
+use super::direct_light::DirectLight;
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 use crate::sampling::mix;
-use crate::scene::{Interaction, SurfacePoint};
+use crate::scene::{Ray, Scene, SurfacePoint};
+use crate::world::World;
 
 /// Number of a ray's patch where the ray left the scene.
 pub const NO_PATCH: u32 = u32::MAX;
 
-/// What the hits of a patch have in common.
-#[derive(Clone, Copy, Debug)]
-pub struct Patch {
-    /// One of the hits, which stands for all.
-    pub surface: SurfacePoint,
+/// A cell of space, and about which way a surface in it faces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchCell {
+    middle: Vec3,
+    /// Of the rounded normal, unit length.
+    normal: Vec3,
+    width: f32,
     key: u64,
-    /// Sum of k_d over the hits.
-    diffuse: Vec3,
-    hits: u32,
 }
 
-impl Patch {
-    /// Mean k_d of the hits.
-    pub fn diffuse(&self) -> Vec3 {
-        self.diffuse / self.hits as f32
+impl PatchCell {
+    /// The cell of a surface point; normals are told apart in quarters of unit length by axis.
+    #[inline(always)]
+    pub fn of(surface: &SurfacePoint, width: f32) -> Self {
+        // Rounded down, as `floor` does for numbers that fit; a call of which costs more than all the rest.
+        let down = |number: f32| {
+            let whole = number as i32;
+            whole.saturating_sub(i32::from(number < whole as f32))
+        };
+        let cell = (surface.position / width).to_array().map(down);
+        let normal = (surface.shading_normal * 4.0 + 0.5).to_array().map(down);
+        let pair = |a: i32, b: i32| u64::from(a as u32) | u64::from(b as u32) << 32;
+        let numbers = [
+            pair(cell[0], cell[1]),
+            pair(cell[2], normal[0]),
+            pair(normal[1], normal[2]),
+            u64::from(width.to_bits()),
+        ];
+        // A hash: other cells practically never have the same.
+        let key = numbers.into_iter().fold(0, |hash, number| mix(hash ^ number));
+        let middle = Vec3::from_array(cell.map(|number| number as f32 + 0.5)) * width;
+        let normal =
+            Vec3::from_array(normal.map(|number| number as f32)).normalize_or(surface.shading_normal);
+        Self { middle, normal, width, key }
+    }
+
+    /// A cell that holds one surface point only.
+    fn of_point(surface: &SurfacePoint) -> Self {
+        let (middle, normal) = (surface.position, surface.shading_normal);
+        let bits = [middle, normal].map(|vector| vector.to_array().map(|number| u64::from(number.to_bits())));
+        let key = bits.as_flattened().iter().fold(0, |hash, bits| mix(hash ^ bits));
+        Self { middle, normal, width: 0.0, key }
+    }
+
+    /// A point of the surface: the first that one of 16 lines through the cell, along the normal, meets. `None` if none does, or
+    /// if it doesn't see a quarter of those that the others meet, and can't stand for them: light would leak under a thin wall.
+    ///
+    /// Also returns the number of occlusion rays.
+    fn surface<A: Accel>(&self, accel: &A, scene: &Scene) -> (Option<SurfacePoint>, u64) {
+        const WIDTH: usize = 16;
+        /// One in so many points may be hidden.
+        const HIDDEN_OF: u32 = 4;
+        /// The lines in a square of 4×4, from its middle outwards.
+        const ORDER: [usize; WIDTH] = [5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15];
+        let Self { middle, normal, width, .. } = *self;
+        let (u, v) = normal.any_orthonormal_pair();
+        // Of the cell along the normal, and a little more for surfaces along its sides.
+        let depth = 1.01 * width * normal.abs().element_sum();
+        let mut packet = RayHitPacket::<WIDTH>::empty();
+        for (lane, place) in ORDER.into_iter().enumerate() {
+            let at = |place: usize| 0.25 * place as f32 - 0.375;
+            let origin = middle + width * (u * at(place % 4) + v * at(place / 4)) + normal * (0.5 * depth);
+            packet.set_lane(lane, &Ray { t_far: depth, ..Ray::new(origin, -normal) });
+        }
+        accel.intersect_packet(u32::from(u16::MAX), &mut packet, Coherence::Coherent);
+        let found = |lane: usize| {
+            let surface = scene.interaction(&hit_of_lane(&packet, lane)?, -normal).point;
+            (Self::of(&surface, width).normal == normal).then_some(surface)
+        };
+        let mut points = (0..WIDTH).filter_map(found);
+        let Some(first) = points.next() else { return (None, 0) };
+        let mut between = RayPacket::<WIDTH>::empty();
+        let mut active: LaneMask = 0;
+        for (lane, other) in points.enumerate() {
+            between.set_lane(lane, &Ray::between(first.ray_origin(), other.ray_origin()));
+            active |= 1 << lane;
+        }
+        let blocked = accel.occluded_packet(active, &mut between, Coherence::Incoherent) & active;
+        let stands_for_all = blocked.count_ones() * HIDDEN_OF <= active.count_ones();
+        (stands_for_all.then_some(first), u64::from(active.count_ones()))
     }
 }
 
-/// Some patches, and which of them each of some rays hit.
+/// A list of cells, each of them once.
 #[derive(Default)]
-pub struct Patches {
+pub struct PatchCells {
     /// By number.
-    pub patches: Vec<Patch>,
-    /// Number of each ray's patch.
-    pub of_ray: Vec<u32>,
-    numbers: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
+    pub cells: Vec<PatchCell>,
+    numbers: Numbers,
 }
 
-impl Patches {
-    /// Adds a ray that hit a surface in a cell of edge `width`, or nothing.
-    #[inline(always)]
-    pub fn push(&mut self, hit: Option<(&Interaction, f32)>) {
-        let number = hit.map_or(NO_PATCH, |(hit, width)| {
-            let key = key(&hit.point, width);
-            self.number(Patch { surface: hit.point, key, diffuse: hit.diffuse, hits: 1 })
-        });
-        self.of_ray.push(number);
-    }
+type Numbers = HashMap<u64, u32, BuildHasherDefault<KeyHasher>>;
 
-    /// Adds the rays and patches of others, after its own. The result depends on the order of the calls alone.
-    pub fn extend(&mut self, others: Self) {
-        let numbers: Vec<u32> = others.patches.into_iter().map(|patch| self.number(patch)).collect();
-        // What has no patch has none here.
-        self.of_ray.extend(
-            others.of_ray.iter().map(|&other| numbers.get(other as usize).copied().unwrap_or(NO_PATCH)),
-        );
-    }
-
-    /// The number of a patch, which is joined to one of the same key.
+impl PatchCells {
+    /// The number of a cell, which is added if it is new.
     #[inline(always)]
-    fn number(&mut self, patch: Patch) -> u32 {
-        let new = self.patches.len() as u32;
-        let number = *self.numbers.entry(patch.key).or_insert(new);
+    pub fn number(&mut self, cell: PatchCell) -> u32 {
+        let new = self.cells.len() as u32;
+        let number = *self.numbers.entry(cell.key).or_insert(new);
         if number == new {
-            self.patches.push(patch);
-        } else if let Some(known) = self.patches.get_mut(number as usize) {
-            known.diffuse += patch.diffuse;
-            known.hits += patch.hits;
+            self.cells.push(cell);
         }
         number
     }
 }
 
-/// What the hits of one patch have in common, and other hits practically never: a hash of the cell of edge `width` and of the
-/// rounded normal.
-#[inline(always)]
-fn key(surface: &SurfacePoint, width: f32) -> u64 {
-    let cell = (surface.position / width).floor().to_array();
-    let normal = (surface.shading_normal * 4.0).round().to_array();
-    // Adding 0 makes one number of the two zeros.
-    let pair = |a: f32, b: f32| u64::from((a + 0.0).to_bits()) | u64::from((b + 0.0).to_bits()) << 32;
-    let numbers =
-        [pair(cell[0], cell[1]), pair(cell[2], normal[0]), pair(normal[1], normal[2]), pair(width, 0.0)];
-    numbers.into_iter().fold(0, |hash, number| mix(hash ^ number))
+/// The patches that are known.
+#[derive(Default)]
+pub struct Patches {
+    cells: PatchCells,
+    /// A point of each patch; `None` where none can stand for it.
+    surfaces: Vec<Option<SurfacePoint>>,
+    /// What falls on each patch directly: I, times the scale of direct light.
+    direct: Vec<Vec3>,
+}
+
+impl Patches {
+    /// Number of patches.
+    pub fn len(&self) -> usize {
+        self.surfaces.len()
+    }
+
+    /// A point of each patch, from number `first` on.
+    pub fn surfaces(&self, first: usize) -> impl Iterator<Item = &SurfacePoint> {
+        self.surfaces.iter().skip(first).flatten()
+    }
+
+    /// What falls on each patch directly.
+    pub fn direct(&self) -> &[Vec3] {
+        &self.direct
+    }
+
+    /// What `of` makes of the point of each patch, in parallel.
+    pub fn map<T: Send>(&self, of: impl Fn(&SurfacePoint) -> T + Sync) -> Vec<Option<T>> {
+        self.surfaces.par_iter().map(|surface| surface.as_ref().map(&of)).collect()
+    }
+
+    /// The number of a cell's patch, whether it is known or not.
+    pub fn number(&mut self, cell: PatchCell) -> u32 {
+        self.cells.number(cell)
+    }
+
+    /// The number of a patch that consists of one surface point.
+    pub fn number_of_point(&mut self, surface: SurfacePoint) -> u32 {
+        let number = self.cells.number(PatchCell::of_point(&surface));
+        if number as usize == self.surfaces.len() {
+            self.surfaces.push(Some(surface));
+        }
+        number
+    }
+
+    /// Whether a patch has a point.
+    pub fn has_point(&self, number: u32) -> bool {
+        self.surfaces.get(number as usize).is_some_and(Option::is_some)
+    }
+
+    /// Finds points of the cells that were added since; returns the number of occlusion rays.
+    pub fn find_points<A: Accel>(&mut self, world: World<A>) -> u64 {
+        let World { accel, scene, .. } = world;
+        let new = self.cells.cells[self.surfaces.len()..].par_iter();
+        let (surfaces, rays): (Vec<_>, Vec<u64>) = new.map(|cell| cell.surface(accel, scene)).unzip();
+        self.surfaces.extend(surfaces);
+        rays.iter().sum()
+    }
+
+    /// Finds what falls on the patches directly that were added since; returns the number of occlusion rays.
+    pub fn find_direct<A: Accel>(&mut self, world: World<A>, scale: f32) -> u64 {
+        let World { accel, lights, .. } = world;
+        let first = self.direct.len();
+        let new = self.cells.cells[first..].par_iter().zip(&self.surfaces[first..]);
+        let (light, rays): (Vec<Vec3>, Vec<u64>) = new
+            .map_init(DirectLight::default, |direct, (cell, surface)| {
+                direct.rays = 0;
+                let light =
+                    surface.map_or(Vec3::ZERO, |surface| direct.at(accel, lights, &surface, cell.width));
+                (light * scale, direct.rays)
+            })
+            .unzip();
+        self.direct.extend(light);
+        rays.iter().sum()
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.cells.cells.capacity() * size_of::<PatchCell>()
+            + self.cells.numbers.capacity() * size_of::<(u64, u32)>()
+            + self.surfaces.capacity() * size_of::<Option<SurfacePoint>>()
+            + self.direct.capacity() * size_of::<Vec3>()
+    }
 }
 
 /// Takes keys, which are hashes, for what they are.
@@ -115,60 +237,22 @@ impl Hasher for KeyHasher {
 mod tests {
     use super::*;
 
-    fn point(x: f32, normal: Vec3, diffuse: f32) -> Interaction {
-        Interaction {
-            point: SurfacePoint::flat(Vec3::new(x, 0.0, 0.0), normal),
-            diffuse: Vec3::splat(diffuse),
-            specular: Vec3::ZERO,
-            emission: Vec3::ZERO,
-            front: true,
-            two_sided: false,
-            culled: false,
-        }
-    }
-
-    fn patches(hits: &[Option<Interaction>], width: f32) -> Patches {
-        let mut patches = Patches::default();
-        hits.iter().for_each(|hit| patches.push(hit.as_ref().map(|hit| (hit, width))));
-        patches
-    }
-
-    fn hits() -> [Option<Interaction>; 6] {
-        [
-            Some(point(0.1, Vec3::Y, 0.2)),
-            None,
-            Some(point(0.9, Vec3::Y, 0.4)),
-            Some(point(0.1, Vec3::NEG_Y, 0.5)),
-            Some(point(1.1, Vec3::Y, 0.7)),
-            Some(point(-0.1, Vec3::Y, 0.9)),
-        ]
+    fn cell(x: f32, normal: Vec3, width: f32) -> PatchCell {
+        PatchCell::of(&SurfacePoint::flat(Vec3::new(x, 0.0, 0.0), normal), width)
     }
 
     /// Hits share a patch where they are near and face the same way; the two sides of a wall never do.
     #[test]
     fn patches_join_what_is_near_and_faces_the_same_way() {
-        let patches = patches(&hits(), 1.0);
-        assert_eq!(patches.of_ray, [0, NO_PATCH, 0, 1, 2, 3]);
-        assert!((patches.patches[0].diffuse().x - 0.3).abs() < 1e-6);
-    }
-
-    /// Patches that were found in parts are those that are found at once.
-    #[test]
-    fn parts_join() {
-        let hits = hits();
-        let whole = patches(&hits, 1.0);
-        for cut in 0..=hits.len() {
-            let mut joined = patches(&hits[..cut], 1.0);
-            joined.extend(patches(&hits[cut..], 1.0));
-            assert_eq!(joined.of_ray, whole.of_ray);
-            let diffuse = |patches: &Patches| patches.patches.iter().map(Patch::diffuse).collect::<Vec<_>>();
-            assert_eq!(diffuse(&joined), diffuse(&whole));
-        }
+        let mut cells = PatchCells::default();
+        let hits = [(0.1, Vec3::Y), (0.9, Vec3::Y), (0.1, Vec3::NEG_Y), (1.1, Vec3::Y), (-0.1, Vec3::Y)];
+        let numbers = hits.map(|(x, normal)| cells.number(cell(x, normal, 1.0)));
+        assert_eq!(numbers, [0, 0, 1, 2, 3]);
     }
 
     /// Far away cells are too many to count, and nothing panics.
     #[test]
     fn far_hits_have_patches() {
-        assert_eq!(patches(&[Some(point(1e30, Vec3::Y, 0.5))], 1e-9).of_ray, [0]);
+        assert_ne!(cell(1e30, Vec3::Y, 1e-9), cell(-1e30, Vec3::Y, 1e-9));
     }
 }

@@ -5,11 +5,11 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::direct_light::DirectLight;
 use super::gather::{Gathering, POINTS_PER_TASK};
 use super::interpolation::{DirectTransport, IndirectInterpolation};
 use super::mesh::IndirectMesh;
 use super::octahedral::IrradianceSums;
+use super::series::Series;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::lookup::LookupScratch;
@@ -31,14 +31,15 @@ impl IndirectMesh {
     ) -> u64 {
         let World { accel, scene, lights, .. } = world;
         let first = self.values.len();
-        let patches = &gathering.patches;
+        let by_patches = self.settings.form != IndirectForm::Scalar;
+        let traced = if by_patches { self.patches.find_direct(world, transport.scale) } else { 0 };
         let emitted = |point: usize, sums: &mut IrradianceSums, scratch: &mut LookupScratch| {
             for &(direction, light) in &gathering.emitted[point] {
                 self.accumulate(sums, direction, light);
             }
             scratch.rays += self.add_emissive(world, gathering.points[point], sums);
         };
-        let (one_bounce, mut rays) = if self.settings.form == IndirectForm::Scalar {
+        let (one_bounce, mut rays) = if !by_patches {
             let direct = direct.view(lights, transport.interpolation);
             let directions = self.directions.len();
             self.sweep(gathering, |point, sums, scratch| {
@@ -55,49 +56,40 @@ impl IndirectMesh {
                 emitted(point, sums, scratch);
             })
         } else {
-            let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
-                .patches
-                .par_iter()
-                .map_init(DirectLight::default, |direct, patch| {
-                    direct.rays = 0;
-                    let light = direct.at(accel, lights, &patch.surface) * transport.scale;
-                    (patch.diffuse() * light, direct.rays)
-                })
-                .unzip();
             let (values, rays) = self.sweep(gathering, |point, sums, scratch| {
-                self.add_patches(gathering, point, &radiance, scene.background, sums);
+                self.add_patches(gathering, point, self.patches.direct(), scene.background, sums);
                 emitted(point, sums, scratch);
             });
-            (values, rays + traced.iter().sum::<u64>())
+            (values, rays + traced)
         };
         self.values.extend_from_slice(&one_bounce);
         if self.settings.bounces == 1 {
             return rays;
         }
-        let peak =
-            |values: &[[f32; 3]]| values.as_flattened().iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
-        for _ in 1..self.settings.bounces {
+        let view = self.view(interpolation);
+        let stencils = self.patches.map(|surface| {
+            let mut scratch = LookupScratch::default();
+            (view.stencil(accel, surface, &mut scratch), scratch.rays)
+        });
+        rays += stencils.iter().flatten().map(|(_, rays)| rays).sum::<u64>();
+        let mut series = Series::default();
+        for bounce in 1..self.settings.bounces {
             let view = self.view(interpolation);
-            let (radiance, traced): (Vec<Vec3>, Vec<u64>) = patches
-                .patches
+            let received: Vec<Vec3> = stencils
                 .par_iter()
-                .map_init(LookupScratch::default, |scratch, patch| {
-                    scratch.rays = 0;
-                    (patch.diffuse() * view.illumination(accel, &patch.surface, scratch), scratch.rays)
+                .map(|stencil| {
+                    stencil.as_ref().map_or(Vec3::ZERO, |(stencil, _)| view.illumination_at(stencil))
                 })
-                .unzip();
-            rays += traced.iter().sum::<u64>();
+                .collect();
             let (mut next, _) = self.sweep(gathering, |point, sums, _| {
-                self.add_patches(gathering, point, &radiance, Vec3::ZERO, sums);
+                self.add_patches(gathering, point, &received, Vec3::ZERO, sums);
             });
             let flat = next.as_flattened_mut();
             flat.iter_mut().zip(one_bounce.as_flattened()).for_each(|(value, first)| *value += first);
-            let change = flat
-                .iter()
-                .zip(self.values[first..].as_flattened())
-                .fold(0.0f32, |change, (next, value)| change.max((next - value).abs()));
-            let done = change <= self.settings.tolerance * peak(&next);
-            self.values[first..].copy_from_slice(&next);
+            let values = self.values[first..].as_flattened_mut();
+            let remaining = self.settings.bounces - 1 - bounce;
+            let done = series.add(values, flat, remaining, self.settings.tolerance);
+            values.copy_from_slice(flat);
             if done {
                 break;
             }
@@ -105,20 +97,21 @@ impl IndirectMesh {
         rays
     }
 
-    /// Adds what patches send to a point along its rays, given the radiance of each patch, and of where no surface is.
+    /// Adds what patches send to a point along its rays, given what each patch receives, and the light of where no surface is.
     #[inline(always)]
     fn add_patches(
         &self,
         gathering: &Gathering,
         point: usize,
-        radiance: &[Vec3],
+        received: &[Vec3],
         background: Vec3,
         sums: &mut IrradianceSums,
     ) {
         let rotation = rotation_at(gathering.points[point]);
         let count = self.directions.len();
-        for (&direction, &patch) in self.directions.iter().zip(&gathering.patches.of_ray[point * count..]) {
-            let light = radiance.get(patch as usize).copied().unwrap_or(background);
+        let rays = &gathering.rays[point * count..][..count];
+        for (&direction, ray) in self.directions.iter().zip(rays) {
+            let light = received.get(ray.patch as usize).map_or(background, |light| ray.diffuse() * *light);
             self.accumulate(sums, rotation * direction, light);
         }
     }

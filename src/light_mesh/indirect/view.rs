@@ -41,36 +41,75 @@ impl IndirectView<'_> {
         surface: &SurfacePoint,
         scratch: &mut LookupScratch,
     ) -> Vec3 {
-        let Self { mesh, lookup, shading } = self;
+        self.find(accel, surface, scratch);
+        let points = &scratch.points;
+        self.sum(points.iter(), points.total_weight(), surface.shading_normal)
+    }
+
+    /// The points of a surface point, for several looks at values that change.
+    pub fn stencil<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Stencil {
+        self.find(accel, surface, scratch);
+        Stencil {
+            points: scratch.points.iter().collect(),
+            total: scratch.points.total_weight(),
+            normal: surface.shading_normal,
+        }
+    }
+
+    /// Ĩ_d where a stencil was found.
+    pub fn illumination_at(&self, stencil: &Stencil) -> Vec3 {
+        self.sum(stencil.points.iter().copied(), stencil.total, stencil.normal)
+    }
+
+    #[inline(always)]
+    fn find<A: Accel>(&self, accel: &A, surface: &SurfacePoint, scratch: &mut LookupScratch) {
+        let Self { lookup, shading, .. } = self;
         lookup.find(accel, surface, scratch, self);
-        let points = &mut scratch.points;
         if shading.at_surface {
             let (y, normal) = (surface.position, surface.geometric_normal);
             let positions = lookup.store.positions();
-            points.extrapolate_to_surface(|slot| normal.dot(positions[slot as usize] - y));
+            scratch.points.extrapolate_to_surface(|slot| normal.dot(positions[slot as usize] - y));
         }
-        let points = &*points;
+    }
+
+    /// Eq. (5) over mesh points, by slot, with their weights.
+    #[inline(always)]
+    fn sum(&self, points: impl Iterator<Item = (u32, f32)>, total: f32, normal: Vec3) -> Vec3 {
+        let Self { mesh, shading, .. } = self;
         let mut sum = Vec3::ZERO;
         match mesh.settings.form {
             IndirectForm::Scalar => {
-                for (slot, weight) in points.iter() {
+                for (slot, weight) in points {
                     sum += Vec3::from_array(mesh.value(slot)[0]) * weight;
                 }
             }
             IndirectForm::Directional => {
-                let by_normal = OctahedralWeights::of(surface.shading_normal);
-                for (slot, weight) in points.iter() {
+                let by_normal = OctahedralWeights::of(normal);
+                for (slot, weight) in points {
                     sum += by_normal.apply(mesh.value(slot)) * weight;
                 }
             }
         }
         let scale = match shading.normalization {
-            Normalization::Mean => 1.0 / points.total_weight(),
-            Normalization::Integral => 4.0 * PI / points.total_weight(),
+            Normalization::Mean => 1.0 / total,
+            Normalization::Integral => 4.0 * PI / total,
         };
         // The mean and far points may enter with weights below 0, so that a single lamp may leave a trace of darkness behind it.
         sum.max(Vec3::ZERO) * scale
     }
+}
+
+/// The mesh points that a surface point takes its light from.
+pub struct Stencil {
+    /// Slots and weights.
+    points: Vec<(u32, f32)>,
+    total: f32,
+    normal: Vec3,
 }
 
 impl Differ for IndirectView<'_> {
