@@ -60,7 +60,7 @@ pub const POINTS_PER_TASK: usize = 4;
 /// Mesh points whose hits are sorted by themselves: so many that most patches are found more than once.
 const POINTS_PER_PART: usize = 32;
 
-/// Width of the patches that are tried where no point can stand for a patch.
+/// Width of the patches that are tried where no point can stand for a patch, over that patch's.
 const SMALLER_PATCH: f32 = 0.25;
 
 impl IndirectMesh {
@@ -171,7 +171,7 @@ impl IndirectMesh {
         }
         let mut occlusion = self.patches.find_points(world);
         // Hits in cells whose surface no point stands for are sorted into smaller cells, and at last stand for themselves.
-        for share in [Some(SMALLER_PATCH), None] {
+        for in_cells in [true, false] {
             let homeless: Vec<(usize, SurfacePoint)> = gathering.rays[first..]
                 .par_iter()
                 .zip(hits)
@@ -184,9 +184,11 @@ impl IndirectMesh {
                 })
                 .collect();
             for (number, surface) in homeless {
-                gathering.rays[number].patch = match share {
-                    Some(share) => self.patches.number(PatchCell::of(&surface, share * width(&surface))),
-                    None => self.patches.number_of_point(surface),
+                let width = SMALLER_PATCH * width(&surface);
+                gathering.rays[number].patch = if in_cells {
+                    self.patches.number(PatchCell::of(&surface, width))
+                } else {
+                    self.patches.number_of_point(surface, width)
                 };
             }
             occlusion += self.patches.find_points(world);

@@ -58,12 +58,12 @@ impl PatchCell {
         Self { middle, normal, width, key }
     }
 
-    /// A cell that holds one surface point only.
-    fn of_point(surface: &SurfacePoint) -> Self {
+    /// A cell that holds one surface point only, which stands for so much around it.
+    fn of_point(surface: &SurfacePoint, width: f32) -> Self {
         let (middle, normal) = (surface.position, surface.shading_normal);
         let bits = [middle, normal].map(|vector| vector.to_array().map(|number| u64::from(number.to_bits())));
         let key = bits.as_flattened().iter().fold(0, |hash, bits| mix(hash ^ bits));
-        Self { middle, normal, width: 0.0, key }
+        Self { middle, normal, width, key }
     }
 
     /// A point of the surface: the first that one of 16 lines through the cell, along the normal, meets. `None` if none does, or
@@ -164,9 +164,9 @@ impl Patches {
         self.cells.number(cell)
     }
 
-    /// The number of a patch that consists of one surface point.
-    pub fn number_of_point(&mut self, surface: SurfacePoint) -> u32 {
-        let number = self.cells.number(PatchCell::of_point(&surface));
+    /// The number of a patch of which one surface point is known; `width` is what it stands for.
+    pub fn number_of_point(&mut self, surface: SurfacePoint, width: f32) -> u32 {
+        let number = self.cells.number(PatchCell::of_point(&surface, width));
         if number as usize == self.surfaces.len() {
             self.surfaces.push(Some(surface));
         }
