@@ -6,7 +6,9 @@
 //! goes from light to light and traces, for the whole tile at once, what has to be.
 
 mod patch;
+mod places;
 mod prior;
+mod strengths;
 mod trace;
 
 use glam::Vec3;

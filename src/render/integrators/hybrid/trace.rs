@@ -1,15 +1,15 @@
 //! Which rays towards a light are traced in a tile.
 
-use glam::Vec3;
-
 use super::patch::Patch;
+use super::places::Places;
 use super::prior::{Assumption, Prior};
+use super::strengths::strengths;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{IncidentLights, PackedLights};
+use crate::lights::PackedLights;
 use crate::render::stats::{HybridError, ShadeCounters};
 use crate::render::tiles::{TILE, Tile};
 use crate::render::trace::PathVertex;
-use crate::simd::{LANES, Lanes};
+use crate::simd::LANES;
 
 /// Rays per patch that check what is assumed, all lights together, for a tolerance of [`TOLERANCE`]; for half of it four
 /// times as many, as the errors of samples go. They are shared among the lights in proportion to what each would give the tile if nothing
@@ -27,12 +27,6 @@ const MOST_WITHOUT_CORNERS: f32 = 0.005;
 /// Where this share of the squares around have corners that disagree, shadows are so fine that corners may agree by chance. A
 /// straight edge beside a square crosses three of the eight around it.
 const MIXED_OF: [u32; 2] = [4, 9];
-
-/// Places of a tile at which the strength of its lights is found.
-const PLACES: usize = 8;
-
-/// Share of a light's strength that doesn't follow the cosine: what a normal at one place hides, others may see.
-const ANY_NORMAL: f32 = 0.1;
 
 /// What is known of the light in one patch.
 #[derive(Clone, Copy)]
@@ -238,58 +232,41 @@ impl<'a, A: Accel> LightTracer<'a, A> {
     /// in squares next to each other, are a place; one that a single check found is mended, and stands for others that
     /// were missed, unless it was so large, and checks so many, that it couldn't have been.
     fn missed_light(&self, index: usize, light: usize, checks: usize) -> f32 {
-        let (mut found, mut twice, mut finders) = (0u64, 0u64, [0u32; 64]);
+        let mut places = Places::new();
         for &(number, point) in &self.checks {
             let view = &self.views[number as usize];
             if (view.seeing & point != 0) != (view.prior == Assumption::Lit) {
-                let square = self.patches[number as usize].square_bit();
-                twice |= found & square;
-                found |= square;
-                finders[square.trailing_zeros() as usize] = number;
+                places.add_check(self.patches[number as usize].square, number);
             }
         }
-        if found == 0 {
+        if places.is_empty() {
             return 0.0;
         }
-        let (mut squares, mut points, mut all) = (0u64, [0u32; 64], 0);
         for (view, patch) in self.views.iter().zip(&*self.patches) {
-            all += patch.vertices.len();
             let mistaken = match view.prior {
                 Assumption::Lit => view.facing & !view.lit(),
                 Assumption::Dark => view.lit(),
                 Assumption::Open | Assumption::Weak => 0,
             };
-            if mistaken != 0 {
-                squares |= patch.square_bit();
-                points[usize::from(patch.square)] += mistaken.count_ones();
-            }
+            places.add_points(patch.square, mistaken.count_ones());
         }
         let per_patch = checks as f32 / self.patches.len() as f32;
         let mut missed = 0.0;
-        while found != 0 {
-            let (mut place, mut before) = (found & found.wrapping_neg(), 0);
-            while place != before {
-                before = place;
-                place = Tile::around(place) & squares | place;
-            }
-            if (found & place).count_ones() == 1 && twice & place == 0 {
-                let size: u32 =
-                    (0..64).filter(|square| place >> square & 1 == 1).map(|square| points[square]).sum();
-                let chance = 1.0 - per_patch * (size as f32 / LANES as f32).min(1.0);
-                let finder = finders[(found & place).trailing_zeros() as usize] as usize;
-                let patch = &self.patches[finder];
-                let factors = self.lights.factors(index, light, &patch.group.points);
-                let (mut sum, mut count) = (0.0, 0u32);
-                for lane in 0..LANES {
-                    let facing = self.views[finder].facing >> lane & 1 == 1;
-                    sum += if facing { factors[lane] } else { 0.0 };
-                    count += u32::from(facing);
-                }
-                missed += chance * sum / count.max(1) as f32;
-            }
-            found &= !place;
-        }
-        missed * self.lights.intensity(index, light).iter().sum::<f32>() * all as f32 / checks as f32
+        places.for_each_found_once(|patch, size| {
+            let chance = 1.0 - per_patch * (size as f32 / LANES as f32).min(1.0);
+            missed += chance * self.mean_factor(patch as usize, index, light);
+        });
+        let points: usize = self.patches.iter().map(|patch| patch.vertices.len()).sum();
+        let amount: f32 = self.lights.intensity(index, light).iter().sum();
+        missed * amount * points as f32 / checks as f32
+    }
+
+    /// What a light's intensity is multiplied by at the points of a patch that have it above their horizon: the mean.
+    fn mean_factor(&self, patch: usize, index: usize, light: usize) -> f32 {
+        let factors = self.lights.factors(index, light, &self.patches[patch].group.points);
+        let facing = self.views[patch].facing;
+        let sum: f32 = (0..LANES).filter(|lane| facing >> lane & 1 == 1).map(|lane| factors[lane]).sum();
+        sum / facing.count_ones().max(1) as f32
     }
 
     /// Squares among whose neighbours so many have corners that disagree that no single edge can have made them.
@@ -383,45 +360,4 @@ fn any_of(points: LaneMask, which: usize) -> LaneMask {
     let start = which as u32 % LANES as u32;
     let rotated = (points as u16).rotate_right(start);
     if rotated == 0 { 0 } else { 1 << ((rotated.trailing_zeros() + start) % LANES as u32) }
-}
-
-/// The number of places at which strengths are summed.
-fn places(vertices: &[PathVertex]) -> usize {
-    PLACES.min(vertices.len())
-}
-
-/// What every light would give a tile without any occluder, up to a factor, by chunk.
-#[inline(always)]
-fn strengths(lights: &PackedLights, vertices: &[PathVertex]) -> Vec<Lanes> {
-    let mut strengths =
-        Strengths { lights, normal: Vec3::ZERO, sums: vec![[0.0; LANES]; lights.chunks().len()] };
-    let places = places(vertices);
-    for place in 0..places {
-        let surface = &vertices[(2 * place + 1) * vertices.len() / (2 * places)].surface;
-        strengths.normal = surface.shading_normal;
-        lights.incident_at(surface.position, &mut strengths);
-    }
-    strengths.sums
-}
-
-/// Sums of what lights would give some places, see [`strengths`].
-struct Strengths<'a> {
-    lights: &'a PackedLights,
-    normal: Vec3,
-    sums: Vec<Lanes>,
-}
-
-impl IncidentLights for Strengths<'_> {
-    #[inline(always)]
-    fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
-        let [r, g, b] = &self.lights.chunks()[index].intensity;
-        let n = self.normal;
-        let sums = &mut self.sums[index];
-        for lane in 0..LANES {
-            let cosine = n.x * direction[0][lane] + n.y * direction[1][lane] + n.z * direction[2][lane];
-            let cosine = if cosine > 0.0 { cosine } else { 0.0 };
-            let share = ANY_NORMAL + (1.0 - ANY_NORMAL) * cosine;
-            sums[lane] += (r[lane] + g[lane] + b[lane]) * reciprocal[lane] * share;
-        }
-    }
 }
