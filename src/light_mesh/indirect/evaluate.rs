@@ -10,8 +10,9 @@ use crate::scene::SurfacePoint;
 use crate::settings::{IndirectForm, Leaks};
 use crate::world::World;
 
-/// Width of patches over R: half of what the mean over D_y blurs.
-const PATCH_WIDTH: f32 = 0.5;
+/// Width of patches over the spacing of the mesh points: half of the default R. R itself is an argument of shading, and values
+/// don't depend on it.
+const PATCH_WIDTH: f32 = 0.75;
 
 /// What the evaluation of indirect mesh points took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +68,7 @@ impl IndirectMesh {
             }
             let known = self.patches.len();
             let width = |surface: &SurfacePoint| {
-                PATCH_WIDTH * interpolation.neighbourhoods.radius_at(surface.position)
+                PATCH_WIDTH * interpolation.neighbourhoods.spacing_at(surface.position)
             };
             evaluation.shadow += self.sort_hits(world, &mut gathering, &new, &hits, width);
             needed = if self.settings.bounces > 1 {

@@ -16,6 +16,8 @@ struct Zone {
     bounds: Option<Bounds>,
     /// Number of its layer of points.
     layer: usize,
+    /// The layer's largest spacing along an axis.
+    spacing: f32,
     radius: f32,
     /// The kernel of this radius, around any point.
     kernel: Kernel,
@@ -75,7 +77,7 @@ impl Neighbourhoods {
         };
         let mut zone = |region: Option<Bounds>, spacing: Vec3, radius: f32| {
             let layer = points.layer(&settings.layout, spacing)?;
-            Ok(Zone::new(bounds, region, kernel.neighbourhood, layer, radius))
+            Ok(Zone::new(bounds, region, kernel.neighbourhood, layer, spacing.max_element(), radius))
         };
         let mut zones = vec![zone(None, spacing, radius_for(spacing))?];
         for level in levels.iter().skip(1) {
@@ -128,10 +130,10 @@ impl Neighbourhoods {
         found
     }
 
-    /// R at a position.
+    /// Spacing of the mesh points at a position.
     #[inline(always)]
-    pub(crate) fn radius_at(&self, y: Vec3) -> f32 {
-        self.zones[self.zone_number_at(y)].radius
+    pub(crate) fn spacing_at(&self, y: Vec3) -> f32 {
+        self.zones[self.zone_number_at(y)].spacing
     }
 
     /// The kernel of a surface point, unless the neighbourhood is the nearest point.
@@ -239,6 +241,7 @@ impl Zone {
         region: Option<Bounds>,
         neighbourhood: Neighbourhood,
         layer: usize,
+        spacing: f32,
         radius: f32,
     ) -> Self {
         let kernel = Kernel::new(Vec3::ZERO, None, radius, neighbourhood == Neighbourhood::SmoothSphere);
@@ -246,7 +249,7 @@ impl Zone {
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element() / side;
         let shared =
             neighbourhood != Neighbourhood::Nearest && (bounds.is_empty() || farthest < FARTHEST_CELL);
-        Self { bounds: region, layer, radius, kernel, cells: shared.then_some((side, 1.0 / side)) }
+        Self { bounds: region, layer, spacing, radius, kernel, cells: shared.then_some((side, 1.0 / side)) }
     }
 
     /// Calls `each(id, position)` for the points that may lie in the kernel of some point in a cell.
