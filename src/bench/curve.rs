@@ -116,7 +116,7 @@ pub fn measure(
 }
 
 /// The image that light meshes of a configuration approximate, `side` pixels wide and high.
-pub fn reference_image(
+fn reference_image(
     setup: &Setup,
     backend: &Backend,
     configuration: &Configuration,

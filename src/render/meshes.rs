@@ -8,7 +8,8 @@ use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, Indire
 use crate::light_mesh::points::{AutoSpacing, MeshError};
 use crate::scene::{Camera, Scene};
 use crate::settings::{
-    Estimator, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve, Settings,
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
+    Settings,
 };
 
 /// Light meshes of a scene; they keep their values from one render to the next, whatever settings follow.
@@ -26,9 +27,8 @@ pub struct LightMeshes {
 #[derive(Clone, Debug, PartialEq)]
 struct IndirectIdentity {
     settings: IndirectSettings,
-    direct_points: PointSettings,
-    direct_kernel: KernelSettings,
-    estimator: Estimator,
+    /// How hits look up the direct mesh, in the form that does.
+    direct: Option<(PointSettings, KernelSettings, Estimator)>,
     direct_scale: f32,
     /// How further bounces interpolate the mesh itself.
     shading: Option<IndirectShading>,
@@ -42,9 +42,8 @@ impl IndirectIdentity {
         let indirect = settings.mesh.indirect.clone()?;
         Some(Self {
             shading: (indirect.bounces > 1).then(|| shading.indirect.clone()),
-            direct_points: settings.mesh.direct.clone(),
-            direct_kernel: shading.kernel.clone(),
-            estimator: shading.estimator,
+            direct: (indirect.form == IndirectForm::Scalar)
+                .then(|| (settings.mesh.direct.clone(), shading.kernel.clone(), shading.estimator)),
             direct_scale: shading.direct_scale(),
             intensities: scene.lights.iter().map(|light| light.intensity).collect(),
             background: scene.background,

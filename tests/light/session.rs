@@ -4,7 +4,10 @@ use glam::Vec3;
 use lightmesh::render::{RenderStats, Session, StopToken, Tile, TileSink};
 use lightmesh::scene::Camera;
 use lightmesh::scene::load::LoadedScene;
-use lightmesh::settings::{Estimator, Leaks, Neighbourhood, PointLayout, Radius, Resolve, Settings, Spacing};
+use lightmesh::settings::{
+    Estimator, IndirectForm, IndirectSettings, Leaks, Neighbourhood, PointLayout, Radius, Resolve, Settings,
+    Spacing,
+};
 use std::sync::Mutex;
 
 use crate::common::{bits, forest, picture, session, settings_at};
@@ -77,6 +80,39 @@ fn changed_settings_cost_no_rays_for_known_points() {
         let (image, stats) = render(&mut session, camera, &settings);
         assert_eq!(stats.rays.shadow, 0, "{estimator}");
         assert!(image == bits(&picture(&switched, camera, &settings).0), "{estimator}");
+    }
+}
+
+/// Indirect light by patches follows from the scene alone: estimator and kernel of direct light, and with one bounce its own
+/// radius, gather nothing again. In the paper's form hits are lit by the direct mesh, and other ways to read that are other light.
+#[test]
+fn gathered_light_outlives_what_it_does_not_follow_from() {
+    let loaded = loaded();
+    let camera = &loaded.cameras[0];
+    type Change = fn(&mut Settings);
+    let changes: [(&str, Change); 3] = [
+        ("estimator", |s| s.shading.estimator = Estimator::Ratio),
+        ("radius", |s| s.shading.kernel.radius = Radius::Spacings(2.0)),
+        ("its own radius", |s| s.shading.indirect.kernel.radius = Radius::Spacings(1.2)),
+    ];
+    for form in [IndirectForm::Directional, IndirectForm::Scalar] {
+        let mut base = settings();
+        let mut indirect = IndirectSettings { form, directions: 32, ..IndirectSettings::default() };
+        indirect.points.spacing = Spacing::Units(Vec3::splat(2.5));
+        base.mesh.indirect = Some(indirect);
+        base.shading.indirect.kernel.leaks = Leaks::Allow;
+        let mut session = session(&loaded.scene);
+        assert!(render(&mut session, camera, &base).1.rays.indirect > 0);
+        for (name, change) in changes {
+            let mut settings = base.clone();
+            change(&mut settings);
+            let (image, stats) = render(&mut session, camera, &settings);
+            let kept = form == IndirectForm::Directional || name == "its own radius";
+            assert_eq!(stats.rays.indirect == 0, kept, "{form:?}, {name}");
+            assert!(image == bits(&picture(&loaded.scene, camera, &settings).0), "{form:?}, {name}");
+            // Back to what the next change begins with.
+            render(&mut session, camera, &base);
+        }
     }
 }
 

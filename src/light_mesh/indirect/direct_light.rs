@@ -7,7 +7,7 @@ use glam::Vec3;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::lights::{IncidentLights, PackedLights};
 use crate::sampling::hash_to_unit_cube;
-use crate::scene::{Ray, SurfacePoint};
+use crate::scene::{Falloff, Ray, SurfacePoint};
 use crate::simd::{LANES, Lanes};
 
 /// I at single surface points, from at most 16 occlusion rays each.
@@ -24,9 +24,9 @@ pub struct DirectLight {
 impl DirectLight {
     /// I at a surface point that stands for a square around it of the given width: Σ_i V_i · φ2 · E_i / φ1.
     ///
-    /// Close to a light that single point may get many times what the square does on average. At the foot of a light with inverse-square
-    /// falloff a disc of area w² gets as much as from a distance of w/√2π, as the light comes down to it; so distances d
-    /// count as (d⁴ + (w²/2π)²)^¼, which changes them by a thousandth from 2 w on.
+    /// With inverse-square falloff, close to a light that single point may get many times what the square does on average. As the
+    /// light comes down to it, a disc of area w² gets as much as a point at a distance of w/√2π; so distances d count as
+    /// (d⁴ + (w²/2π)²)^¼, which changes them by a thousandth from 2 w on.
     ///
     /// Where more than 16 lights lie above the horizon, 16 rays are dealt out among them in proportion to what each would give, at equal
     /// steps through their sum from a start that belongs to the position, so that the mean over all starts is I.
@@ -53,23 +53,19 @@ impl DirectLight {
             // How far it is from the sum of the lights before to the next step.
             let mut ahead = hash_to_unit_cube(surface.position).x * step;
             for (light, &amount) in self.unoccluded.iter().enumerate() {
-                let mut steps = 0u32;
-                while ahead < amount && self.chosen.len() < LANES {
-                    ahead += step;
-                    steps += 1;
-                    if steps == LANES as u32 {
-                        break;
-                    }
-                }
-                ahead -= amount;
-                if steps > 0 {
-                    self.chosen.push((light, steps as f32 * step / amount));
+                let steps = ((amount - ahead) / step).ceil().clamp(0.0, LANES as f32);
+                ahead += steps * step - amount;
+                if steps > 0.0 {
+                    self.chosen.push((light, steps * step / amount));
                 }
             }
+            // Rounding may find one more.
+            self.chosen.truncate(LANES);
         }
         let mut packet = RayPacket::<LANES>::empty();
         let (origin, mut active): (_, LaneMask) = (surface.ray_origin(), 0);
-        let near = width * width / (2.0 * PI);
+        let singular = lights.falloff() == Falloff::InverseSquare;
+        let near = if singular { width * width / (2.0 * PI) } else { 0.0 };
         for (lane, (light, factor)) in self.chosen.iter_mut().enumerate() {
             let chunk = &lights.chunks()[*light / LANES];
             let way = Vec3::from_array(chunk.to_light(*light % LANES, origin.to_array()));
@@ -123,7 +119,7 @@ mod tests {
     use super::*;
     use crate::accel::BruteForceAccel;
     use crate::lights::Unoccluded as AllSeen;
-    use crate::scene::{Falloff, Light, Scene};
+    use crate::scene::{Light, Scene};
 
     fn lights(count: usize) -> PackedLights {
         let at = |i: usize| Vec3::new((i % 7) as f32 - 3.0, 1.0 + (i % 3) as f32, (i / 7) as f32 - 2.0);

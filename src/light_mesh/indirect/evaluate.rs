@@ -7,7 +7,7 @@ use crate::accel::Accel;
 use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
 use crate::light_mesh::store::PointMask;
 use crate::scene::SurfacePoint;
-use crate::settings::{IndirectForm, Leaks};
+use crate::settings::Leaks;
 use crate::world::World;
 
 /// Width of patches over the spacing of the mesh points: half of the default R. R itself is an argument of shading, and values
@@ -60,7 +60,7 @@ impl IndirectMesh {
             }
             evaluation.evaluated += new.len() as u64;
             evaluation.rays += hits.len() as u64;
-            if self.settings.form == IndirectForm::Scalar {
+            if self.looks_up_hits() {
                 let lookup = direct.view(world.lights, transport.interpolation).lookup;
                 let direct_needed = self.needed_at(world.scene, &new, &hits, lookup);
                 evaluation.direct_needed += direct_needed.len();
@@ -77,7 +77,7 @@ impl IndirectMesh {
                 PointMask::default()
             };
             gathering.points.extend(new);
-            if self.settings.form == IndirectForm::Scalar {
+            if self.looks_up_hits() {
                 gathering.hits.extend(hits);
             }
         }

@@ -21,7 +21,7 @@ pub struct Gathering {
     pub points: Vec<Vec3>,
     /// What surfaces emit towards a point, by point: direction and light, times the MIS weight.
     pub emitted: Vec<Vec<(Vec3, Vec3)>>,
-    /// N per point.
+    /// N per point, where patches are used.
     pub rays: Vec<GatheredRay>,
     /// N hits per point, where each is looked up by itself.
     pub hits: Vec<Option<Hit>>,
@@ -39,6 +39,8 @@ pub struct GatheredRay {
 impl GatheredRay {
     /// Steps from 0 to 1.
     const STEPS: f32 = 1023.0;
+    /// A ray that left the scene.
+    const MISS: Self = Self { patch: NO_PATCH, diffuse: 0 };
 
     #[inline(always)]
     fn new(patch: u32, diffuse: Vec3) -> Self {
@@ -122,8 +124,8 @@ impl IndirectMesh {
         .collect()
     }
 
-    /// Sorts the hits of new points into patches; `width` is that of a patch at a surface point. Returns the number of occlusion
-    /// rays.
+    /// Sorts the hits of new points into patches, where these are used, and into what surfaces emit; `width` is that of a patch
+    /// at a surface point. Returns the number of occlusion rays.
     pub(super) fn sort_hits<A: Accel>(
         &mut self,
         world: World<A>,
@@ -141,16 +143,17 @@ impl IndirectMesh {
             .with_max_len(1)
             .map(|(points, hits)| {
                 let mut cells = PatchCells::default();
-                let mut rays = Vec::with_capacity(hits.len());
-                let mut emitted = Vec::with_capacity(points.len());
+                let (mut rays, mut emitted) = (Vec::new(), Vec::with_capacity(points.len()));
                 for (&x, hits) in points.iter().zip(hits.chunks(directions)) {
                     let mut towards_x = Vec::new();
                     this.for_each_hit(scene, x, hits, |direction, hit| {
-                        let Some((hit, surface)) = hit else {
-                            return rays.push(GatheredRay::new(NO_PATCH, Vec3::ZERO));
-                        };
-                        let number = cells.number(PatchCell::of(&surface.point, width(&surface.point)));
-                        rays.push(GatheredRay::new(number, surface.diffuse));
+                        if this.uses_patches() {
+                            rays.push(hit.as_ref().map_or(GatheredRay::MISS, |(_, surface)| {
+                                let cell = PatchCell::of(&surface.point, width(&surface.point));
+                                GatheredRay::new(cells.number(cell), surface.diffuse)
+                            }));
+                        }
+                        let Some((hit, surface)) = hit else { return };
                         if surface.emission != Vec3::ZERO {
                             let share = this.mis_weight(emissive.pdf(scene, x, hit, &surface.point));
                             towards_x.push((direction, surface.emission * share));

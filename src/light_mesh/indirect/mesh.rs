@@ -49,6 +49,16 @@ impl IndirectMesh {
         Ok(IndirectInterpolation { neighbourhoods, shading: shading.clone() })
     }
 
+    /// Whether hits look up the direct mesh one by one, as in the paper's form, instead of sharing what falls on a patch.
+    pub(super) fn looks_up_hits(&self) -> bool {
+        self.settings.form == IndirectForm::Scalar
+    }
+
+    /// Whether it matters which patches its rays hit.
+    pub(super) fn uses_patches(&self) -> bool {
+        !self.looks_up_hits() || self.settings.bounces > 1
+    }
+
     /// RGB values per mesh point.
     pub(super) fn entries(&self) -> usize {
         match self.settings.form {

@@ -154,9 +154,10 @@ impl Patches {
         &self.direct
     }
 
-    /// What `of` makes of the point of each patch, in parallel.
-    pub fn map<T: Send>(&self, of: impl Fn(&SurfacePoint) -> T + Sync) -> Vec<Option<T>> {
-        self.surfaces.par_iter().map(|surface| surface.as_ref().map(&of)).collect()
+    /// What `of` makes of the point of each patch for which `which` is true, in parallel.
+    pub fn map<T: Send>(&self, which: &[bool], of: impl Fn(&SurfacePoint) -> T + Sync) -> Vec<Option<T>> {
+        let one = |(surface, &which): (&Option<SurfacePoint>, _)| surface.as_ref().filter(|_| which).map(&of);
+        self.surfaces.par_iter().zip(which).map(one).collect()
     }
 
     /// The number of a cell's patch, whether it is known or not.
@@ -236,6 +237,8 @@ impl Hasher for KeyHasher {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::BruteForceAccel;
+    use crate::scene::TriangleMesh;
 
     fn cell(x: f32, normal: Vec3, width: f32) -> PatchCell {
         PatchCell::of(&SurfacePoint::flat(Vec3::new(x, 0.0, 0.0), normal), width)
@@ -248,6 +251,37 @@ mod tests {
         let hits = [(0.1, Vec3::Y), (0.9, Vec3::Y), (0.1, Vec3::NEG_Y), (1.1, Vec3::Y), (-0.1, Vec3::Y)];
         let numbers = hits.map(|(x, normal)| cells.number(cell(x, normal, 1.0)));
         assert_eq!(numbers, [0, 0, 1, 2, 3]);
+    }
+
+    /// A floor of 2×2, and if asked a wall across it that has no thickness, at x = 0.5.
+    fn floor(wall: bool) -> Scene {
+        let square = |corner: Vec3, u: Vec3, v: Vec3| [corner, corner + u, corner + u + v, corner + v];
+        let mut corners = square(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X).to_vec();
+        if wall {
+            corners.extend(square(Vec3::new(0.5, -1.0, -1.0), 2.0 * Vec3::Y, 2.0 * Vec3::Z));
+        }
+        let triangles =
+            (0..corners.len() as u32).step_by(4).flat_map(|i| [[i, i + 1, i + 2], [i, i + 2, i + 3]]);
+        let positions = corners.iter().map(|corner| corner.to_array()).collect();
+        let mut scene = Scene::new();
+        scene.add(TriangleMesh::new(positions, triangles.collect()));
+        scene
+    }
+
+    /// A point stands for the surface of its cell, wherever in it a ray ended; but not across a wall, and none does where nothing is.
+    #[test]
+    fn a_point_stands_for_what_it_sees() {
+        let (open, walled) = (floor(false), floor(true));
+        let [in_the_open, behind_a_wall] = [&open, &walled].map(|scene| {
+            let accel = BruteForceAccel::new(scene);
+            [0.1, 0.9].map(|x| cell(x, Vec3::Y, 1.0).surface(&accel, scene).0)
+        });
+        let point = in_the_open[0].expect("there is a floor");
+        assert!(point.position.y == 0.0 && (0.0..=1.0).contains(&point.position.x), "{point:?}");
+        assert_eq!(in_the_open[1].map(|other| other.position), Some(point.position));
+        assert!(behind_a_wall.iter().all(Option::is_none), "{behind_a_wall:?}");
+        let accel = BruteForceAccel::new(&open);
+        assert!(cell(5.0, Vec3::Y, 1.0).surface(&accel, &open).0.is_none());
     }
 
     /// Far away cells are too many to count, and nothing panics.

@@ -20,7 +20,7 @@ use crate::world::World;
 
 impl IndirectMesh {
     /// Eq. (4) for new points: one bounce, then as many more as the settings allow or until no value changes any more.
-    /// Returns the number of occlusion rays that it took to see emitters and to keep light from leaking.
+    /// Returns the number of occlusion rays that it took to light patches, to see emitters and to keep light from leaking.
     pub(super) fn solve<A: Accel>(
         &mut self,
         world: World<A>,
@@ -31,15 +31,17 @@ impl IndirectMesh {
     ) -> u64 {
         let World { accel, scene, lights, .. } = world;
         let first = self.values.len();
-        let by_patches = self.settings.form != IndirectForm::Scalar;
-        let traced = if by_patches { self.patches.find_direct(world, transport.scale) } else { 0 };
+        let mut rays = 0;
+        if !self.looks_up_hits() {
+            rays += self.patches.find_direct(world, transport.scale);
+        }
         let emitted = |point: usize, sums: &mut IrradianceSums, scratch: &mut LookupScratch| {
             for &(direction, light) in &gathering.emitted[point] {
                 self.accumulate(sums, direction, light);
             }
             scratch.rays += self.add_emissive(world, gathering.points[point], sums);
         };
-        let (one_bounce, mut rays) = if !by_patches {
+        let (one_bounce, traced) = if self.looks_up_hits() {
             let direct = direct.view(lights, transport.interpolation);
             let directions = self.directions.len();
             self.sweep(gathering, |point, sums, scratch| {
@@ -56,18 +58,25 @@ impl IndirectMesh {
                 emitted(point, sums, scratch);
             })
         } else {
-            let (values, rays) = self.sweep(gathering, |point, sums, scratch| {
+            self.sweep(gathering, |point, sums, scratch| {
                 self.add_patches(gathering, point, self.patches.direct(), scene.background, sums);
                 emitted(point, sums, scratch);
-            });
-            (values, rays + traced)
+            })
         };
+        rays += traced;
         self.values.extend_from_slice(&one_bounce);
         if self.settings.bounces == 1 {
             return rays;
         }
         let view = self.view(interpolation);
-        let stencils = self.patches.map(|surface| {
+        // Of patches that only earlier points see nothing is asked.
+        let mut seen = vec![false; self.patches.len()];
+        for ray in &gathering.rays {
+            if let Some(seen) = seen.get_mut(ray.patch as usize) {
+                *seen = true;
+            }
+        }
+        let stencils = self.patches.map(&seen, |surface| {
             let mut scratch = LookupScratch::default();
             (view.stencil(accel, surface, &mut scratch), scratch.rays)
         });
