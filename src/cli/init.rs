@@ -129,7 +129,7 @@ fn scene_file(
     }
     line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
     line(format!("resolve = \"{}\"", Resolve::Trace));
-    line("\n# Indirect light: remove the # to have it.\n# [light_mesh.indirect]".to_owned());
+    line("\n# Light from surfaces, bounce after bounce: remove the # to have it.\n# [light_mesh.indirect]\n# bounces = 4".to_owned());
     line("\n[[geometry]]".to_owned());
     line(format!("file = {}", quoted(file)));
     if has_lights {
