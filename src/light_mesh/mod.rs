@@ -30,6 +30,7 @@ pub mod lookup;
 #[doc(hidden)]
 pub mod points;
 mod slot;
+pub mod surface;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod store;

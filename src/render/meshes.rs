@@ -1,15 +1,18 @@
 //! The light meshes of a scene, and how one render interpolates them.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 
 use crate::Bounds;
 use crate::light_mesh::direct::{DirectInterpolation, DirectMesh};
 use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::light_mesh::points::{AutoSpacing, MeshError};
+use crate::light_mesh::surface::SurfaceMesh;
 use crate::scene::{Camera, Scene};
 use crate::settings::{
-    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
-    Settings,
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, Normalization, PointSettings,
+    Resolve, Settings, Spacing,
 };
 
 /// Light meshes of a scene; they keep their values from one render to the next, whatever settings follow.
@@ -19,6 +22,8 @@ use crate::settings::{
 pub struct LightMeshes {
     pub(super) direct: DirectMesh,
     pub(super) indirect: Option<IndirectMesh>,
+    /// Points on surfaces, in the form that has them.
+    pub(super) surface: Option<SurfaceMesh>,
     /// What the values of the indirect mesh follow from.
     indirect_identity: Option<IndirectIdentity>,
 }
@@ -41,7 +46,9 @@ impl IndirectIdentity {
         let shading = &settings.shading;
         let indirect = settings.mesh.indirect.clone()?;
         Some(Self {
-            shading: (indirect.bounces > 1).then(|| shading.indirect.clone()),
+            // Light at surfaces takes nothing from a kernel.
+            shading: (indirect.bounces > 1 && indirect.form != IndirectForm::Surface)
+                .then(|| shading.indirect.clone()),
             direct: (indirect.form == IndirectForm::Scalar)
                 .then(|| (settings.mesh.direct.clone(), shading.kernel.clone(), shading.estimator)),
             direct_scale: shading.direct_scale(),
@@ -56,6 +63,8 @@ impl IndirectIdentity {
 pub struct MeshInterpolation {
     pub(super) direct: DirectInterpolation,
     pub(super) indirect: Option<IndirectInterpolation>,
+    /// What light at surfaces is multiplied by.
+    pub(super) surface_scale: f32,
     /// What I(y) is multiplied by before k_d.
     pub(super) direct_scale: f32,
     /// Whether lights on which mesh points disagree are traced.
@@ -74,7 +83,7 @@ impl MeshInterpolation {
 impl LightMeshes {
     /// Meshes over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
-        Self { direct: DirectMesh::new(bounds), indirect: None, indirect_identity: None }
+        Self { direct: DirectMesh::new(bounds), indirect: None, surface: None, indirect_identity: None }
     }
 
     /// Makes the meshes ready to be interpolated by these settings. Values stay, but for those of an indirect mesh that other settings
@@ -91,7 +100,8 @@ impl LightMeshes {
         let shading = &settings.shading;
         let hybrid = shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight;
         // Values that are averaged must not change their spacing within the picture, nor what indirect light is made of with the view.
-        let auto = if hybrid && settings.mesh.indirect.is_none() {
+        let by_direct = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
+        let auto = if hybrid && !settings.mesh.indirect.as_ref().is_some_and(by_direct) {
             AutoSpacing::Pixels(camera.pixel_footprint(settings.view.resolution))
         } else {
             AutoSpacing::AVERAGED
@@ -101,8 +111,13 @@ impl LightMeshes {
         let identity = IndirectIdentity::of(settings, scene);
         if self.indirect_identity != identity {
             let bounds = self.direct.store().points.bounds();
-            self.indirect =
-                settings.mesh.indirect.as_ref().map(|indirect| IndirectMesh::new(bounds, indirect));
+            let of_form = |surface| {
+                let settings = settings.mesh.indirect.as_ref();
+                settings.filter(|indirect| (indirect.form == IndirectForm::Surface) == surface)
+            };
+            self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
+            self.surface =
+                of_form(true).map(|indirect| SurfaceMesh::new(indirect, surface_width(indirect, bounds)));
             self.indirect_identity = identity;
         }
         let indirect = match &mut self.indirect {
@@ -112,6 +127,10 @@ impl LightMeshes {
         Ok(MeshInterpolation {
             direct,
             indirect,
+            surface_scale: match shading.indirect.normalization {
+                Normalization::Mean => 1.0,
+                Normalization::Integral => 4.0 * PI,
+            },
             direct_scale: shading.direct_scale(),
             hybrid,
             tolerance: shading.tolerance,
@@ -121,11 +140,24 @@ impl LightMeshes {
     /// Forgets what depends on the lights' intensities; visibility stays.
     pub(super) fn forget_intensities(&mut self) {
         self.direct.forget_intensities();
-        (self.indirect, self.indirect_identity) = (None, None);
+        (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.direct.memory_bytes() + self.indirect.as_ref().map_or(0, IndirectMesh::memory_bytes)
+        self.direct.memory_bytes()
+            + self.indirect.as_ref().map_or(0, IndirectMesh::memory_bytes)
+            + self.surface.as_ref().map_or(0, SurfaceMesh::memory_bytes)
+    }
+}
+
+/// Cells of a surface mesh along the diagonal of a scene, by default.
+const CELLS_ALONG_DIAGONAL: f32 = 60.0;
+
+/// Width of the cells of a surface mesh.
+fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> f32 {
+    match settings.points.spacing {
+        Spacing::Auto => bounds.extent().length() / CELLS_ALONG_DIAGONAL,
+        Spacing::Units(spacing) => spacing.max_element(),
     }
 }

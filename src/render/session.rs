@@ -1,6 +1,7 @@
 //! A scene that is rendered more than once: everything that outlives a view.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::choice::choose;
 use super::error::{RenderError, SessionError};
@@ -14,6 +15,7 @@ use crate::accel::{Accel, Backend, BackendChoice, with_accel};
 use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectField};
 use crate::light_mesh::store::PointMask;
+use crate::light_mesh::surface::{PixelGroups, SurfaceView};
 use crate::lights::{EmissiveTriangles, PackedLights};
 use crate::scene::{Camera, Scene, SceneError};
 use crate::settings::{Integrator, Settings};
@@ -206,6 +208,35 @@ fn render_frame<A: Accel>(
                     stats.mesh_points.indirect.needed += needed.len();
                     let transport = interpolation.transport();
                     stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
+                });
+                stats.seconds.mesh = seconds;
+            }
+            if let Some(mesh) = &mut meshes.surface {
+                let resolution = settings.view.resolution;
+                mesh.turn_to(SurfaceView {
+                    footprint: camera.pixel_footprint(resolution),
+                    height: resolution.1,
+                });
+                frame.trace_image(&mut stats, |paths, stats| {
+                    let mut seconds = stats.seconds.mesh;
+                    timed(&mut seconds, || {
+                        let groups: Vec<PixelGroups> =
+                            paths.par_iter().map(|paths| paths.groups(&mesh.view().footprint)).collect();
+                        let evaluation = mesh.need(
+                            world,
+                            groups
+                                .iter()
+                                .map(|groups| groups.groups.iter().map(|group| &group.first).collect())
+                                .collect(),
+                        );
+                        stats.add_surface(evaluation);
+                    });
+                    stats.seconds.mesh = seconds;
+                })?;
+                let mut seconds = stats.seconds.mesh;
+                timed(&mut seconds, || {
+                    let evaluation = mesh.evaluate(world, interpolation.direct_scale);
+                    stats.add_surface(evaluation);
                 });
                 stats.seconds.mesh = seconds;
             }

@@ -5,6 +5,7 @@ use serde::{Serialize, Serializer};
 use super::choice::Choice;
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
+use crate::light_mesh::surface::SurfaceEvaluation;
 use crate::settings::Integrator;
 
 /// Wall-clock seconds per stage of rendering.
@@ -25,9 +26,9 @@ pub struct RayCounters {
     pub camera: u64,
     /// Mirror reflections.
     pub reflection: u64,
-    /// Occlusion rays, from mesh points or from surface points.
+    /// Occlusion rays, from mesh points or from surface points, and rays that look for surfaces in cells.
     pub shadow: u64,
-    /// Rays that gather indirect light at mesh points.
+    /// Rays that gather indirect light at mesh points or points on surfaces.
     pub indirect: u64,
     /// Rays that look whether mesh points lie inside of geometry.
     pub inside: u64,
@@ -36,7 +37,7 @@ pub struct RayCounters {
 /// Counters of one light mesh in one render.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PointCounters {
-    /// About how many points the neighbourhoods of surface points could reach.
+    /// About how many points the neighbourhoods of surface points could reach; 0 for points on surfaces, which nobody counts.
     pub total: u64,
     /// Points that lay in the neighbourhood of some surface point, summed over image blocks.
     pub needed: u64,
@@ -51,7 +52,7 @@ pub struct PointCounters {
 pub struct MeshCounters {
     /// Direct light mesh.
     pub direct: PointCounters,
-    /// Indirect light mesh.
+    /// Indirect light mesh, or points on surfaces: records are needed, records and sources evaluated.
     pub indirect: PointCounters,
 }
 
@@ -123,6 +124,14 @@ impl RenderStats {
         self.mesh_points.direct.evaluated += evaluation.evaluated;
         self.rays.shadow += evaluation.shadow;
         self.rays.inside += evaluation.inside;
+    }
+
+    /// Adds what the evaluation of a surface mesh took.
+    pub(super) fn add_surface(&mut self, evaluation: SurfaceEvaluation) {
+        self.mesh_points.indirect.evaluated += evaluation.evaluated;
+        self.mesh_points.indirect.needed += evaluation.needed;
+        self.rays.indirect += evaluation.rays;
+        self.rays.shadow += evaluation.shadow;
     }
 
     /// Adds what the evaluation of indirect mesh points took.

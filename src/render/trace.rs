@@ -5,7 +5,8 @@ use pulp::NullaryFnOnce;
 
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
-use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene, SurfacePoint};
+use crate::light_mesh::surface::PixelGroups;
+use crate::scene::{CameraRays, Hit, Interaction, PixelFootprint, Ray, Scene, SurfacePoint};
 use crate::settings::ViewSettings;
 use crate::simd::vectorize;
 use crate::world::World;
@@ -35,6 +36,14 @@ pub struct TilePaths {
     pub camera_rays: u64,
     /// Mirror reflections traced.
     pub reflection_rays: u64,
+}
+
+impl TilePaths {
+    /// The surface points in groups that are close together.
+    pub fn groups(&self, footprint: &PixelFootprint) -> PixelGroups {
+        let surfaces = self.vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
+        PixelGroups::new(surfaces, self.radiance.len(), footprint)
+    }
 }
 
 /// A camera ray or reflection under way.

@@ -100,6 +100,8 @@ named_enum! {
         Scalar = "scalar",
         /// Irradiance by normal
         Directional = "directional",
+        /// Points on surfaces
+        Surface = "surface",
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::settings::{
-    Estimator, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
+    Estimator, IndirectForm, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
 };
 
 use crate::common::failed::assert_same_bits;
@@ -42,6 +42,10 @@ fn variants() -> Vec<(&'static str, Settings)> {
         variant("one bounce", &|s| s.mesh.indirect = indirect()),
         variant("three bounces", &|s| {
             s.mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, ..indirect });
+        }),
+        variant("points on surfaces", &|s| {
+            let form = IndirectForm::Surface;
+            s.mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, form, ..indirect });
         }),
     ]
 }

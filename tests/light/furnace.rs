@@ -54,7 +54,7 @@ fn assert_all_within_one_percent(pixels: &[[f32; 3]], expected: f32, what: &str)
 #[test]
 fn a_furnace_settles_at_the_sum_of_all_bounces() {
     for albedo in [0.2, 0.5, 0.8] {
-        for form in [IndirectForm::Scalar, IndirectForm::Directional] {
+        for form in [IndirectForm::Scalar, IndirectForm::Directional, IndirectForm::Surface] {
             let pixels = furnace(0.7, albedo, indirect(form), Normalization::Mean);
             assert_all_within_one_percent(
                 &pixels,
@@ -68,7 +68,7 @@ fn a_furnace_settles_at_the_sum_of_all_bounces() {
 /// One bounce is the paper's: what surfaces emit, and that reflected once.
 #[test]
 fn one_bounce_of_a_furnace_is_the_first_reflection_alone() {
-    for form in [IndirectForm::Scalar, IndirectForm::Directional] {
+    for form in [IndirectForm::Scalar, IndirectForm::Directional, IndirectForm::Surface] {
         let once = IndirectSettings { bounces: 1, ..indirect(form) };
         let pixels = furnace(0.7, 0.5, once, Normalization::Mean);
         assert_all_within_one_percent(&pixels, 0.7 * 1.5, &format!("{form:?}"));

@@ -48,7 +48,7 @@ fn a_thin_wall_keeps_a_dark_room_dark_with_the_default_settings() {
 
 #[test]
 fn a_thin_wall_keeps_indirect_light_out() {
-    for form in [IndirectForm::Scalar, IndirectForm::Directional] {
+    for form in [IndirectForm::Scalar, IndirectForm::Directional, IndirectForm::Surface] {
         for bounces in [1, 4] {
             let mut settings = Settings::default();
             settings.mesh.direct.spacing = SPACED;

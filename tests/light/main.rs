@@ -11,6 +11,7 @@ mod furnace;
 mod hybrid;
 mod lazy;
 mod leaks;
+mod moving;
 mod penumbra;
 mod physical;
 mod real_scenes;

@@ -32,7 +32,7 @@ fn references() -> Option<PathBuf> {
 }
 
 /// A scene file of one of the references, from its description in numbers.
-fn scene_text(folder: &Path, name: &str, light_mesh: &str) -> String {
+fn scene_text(folder: &Path, name: &str) -> String {
     let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap();
     let description: Value = serde_json::from_str(&text).unwrap();
     let camera = &description["camera"];
@@ -50,7 +50,7 @@ fn scene_text(folder: &Path, name: &str, light_mesh: &str) -> String {
         let (position, intensity) = (&light["position"], &light["intensity_w_per_sr"]);
         let _ = write!(scene, "[[light]]\nposition = {position}\nintensity = {intensity}\n");
     }
-    scene + light_mesh
+    scene
 }
 
 /// A picture of ours beside the path tracer's.
@@ -60,10 +60,10 @@ struct Pair {
     theirs: Image,
 }
 
-/// Renders a reference's scene, with the preset's settings but for what `light_mesh` says and `change` does.
-fn pair(name: &str, reference: &str, light_mesh: &str, change: impl Fn(&mut Settings)) -> Option<Pair> {
+/// Renders a reference's scene, with the preset's settings but for what `change` does.
+fn pair(name: &str, reference: &str, change: impl Fn(&mut Settings)) -> Option<Pair> {
     let folder = references()?;
-    let text = scene_text(&folder, name, light_mesh);
+    let text = scene_text(&folder, name);
     let mut loaded = load_scene_text(&text, &folder.join(format!("{name}.toml"))).unwrap();
     change(&mut loaded.settings);
     let (ours, _) = picture(&loaded.scene, &loaded.cameras[0], &loaded.settings);
@@ -92,7 +92,8 @@ impl Pair {
             .collect()
     }
 
-    /// The 8×8 block means are within 5 %, on average, and the mean of the image is within 2 %.
+    /// The 8×8 block means are within 3 %, on average, and the mean of the image is within 1 %: a few times what the references' own noise
+    /// is.
     fn assert_alike(&self, what: &str) {
         let metrics = metrics::compare(&self.ours, &self.theirs, MetricsOptions::default()).unwrap();
         let block_error = metrics.block_mean_relative_error.unwrap();
@@ -100,26 +101,26 @@ impl Pair {
         println!("{what}: blocks {block_error:.4}, mean {mean_error:+.4}");
         let problem =
             format!("{what}: mean relative error of block means {block_error}, mean off by {mean_error}");
-        assert_images(block_error <= 0.05 && mean_error.abs() <= 0.02, &self.ours, &self.theirs, problem);
+        assert_images(block_error <= 0.03 && mean_error.abs() <= 0.01, &self.ours, &self.theirs, problem);
     }
 }
 
 #[test]
 fn direct_light_of_the_cornell_box_is_the_path_tracers() {
     let no_indirect = |settings: &mut Settings| settings.mesh.indirect = None;
-    let Some(pair) = pair("cornell", "cornell-direct", "", no_indirect) else { return };
+    let Some(pair) = pair("cornell", "cornell-direct", no_indirect) else { return };
     pair.assert_alike("cornell-direct");
 }
 
 #[test]
 fn one_bounce_in_the_cornell_box_is_the_path_tracers() {
-    let Some(pair) = pair("cornell", "cornell-one-bounce", "", one_bounce) else { return };
+    let Some(pair) = pair("cornell", "cornell-one-bounce", one_bounce) else { return };
     pair.assert_alike("cornell-one-bounce");
 }
 
 #[test]
 fn all_bounces_in_the_cornell_box_are_the_path_tracers() {
-    let Some(pair) = pair("cornell", "cornell-all-bounces", "", |_| ()) else { return };
+    let Some(pair) = pair("cornell", "cornell-all-bounces", |_| ()) else { return };
     pair.assert_alike("cornell-all-bounces");
 }
 
@@ -127,7 +128,7 @@ fn all_bounces_in_the_cornell_box_are_the_path_tracers() {
 /// them, through which its edge goes, are left out: they show how pixels are filtered, not how light travels.
 #[test]
 fn a_lamp_lights_the_cornell_box_as_the_path_tracers() {
-    let Some(mut pair) = pair("cornell-lamp", "cornell-lamp-all-bounces", "", |_| ()) else { return };
+    let Some(mut pair) = pair("cornell-lamp", "cornell-lamp-all-bounces", |_| ()) else { return };
     let lamp = pair.loaded.scene.materials.iter().position(|m| m.emission != Vec3::ZERO).unwrap() as u32;
     let (width, height) = (pair.ours.width() as usize, pair.ours.height() as usize);
     let materials = pair.materials();
@@ -145,12 +146,6 @@ fn a_lamp_lights_the_cornell_box_as_the_path_tracers() {
     pair.assert_alike("cornell-lamp-all-bounces");
 }
 
-/// The boards stand on a plank with a gap of 0.2 under it, which needs mesh points of its own: with an automatic spacing it
-/// holds a single layer of them, which can't tell how fast the light falls off into the gap. Light comes from narrow lit
-/// strips, which few of 256 directions hit.
-const BOARDS: &str = "[light_mesh.indirect]\ndirections = 1024\nbounces = 10\n[[light_mesh.indirect.region]]\nmin = [-3.3, -0.05, -1.1]\nmax = [3.3, 0.22, 0.2]\n\
-                      spacing = 0.06\n";
-
 /// Shares of red, green and blue in the light of the given pixels.
 fn tint(image: &Image, pixels: &[usize]) -> Vec3 {
     let sum: Vec3 = pixels.iter().map(|&pixel| Vec3::from_array(image.pixels()[pixel])).sum();
@@ -162,9 +157,9 @@ fn tint(image: &Image, pixels: &[usize]) -> Vec3 {
 /// far from.
 #[test]
 fn the_boards_match_the_path_tracers_and_many_bounces_tint_them() {
-    let Some(one) = pair("wood", "wood-one-bounce", BOARDS, one_bounce) else { return };
+    let Some(one) = pair("wood", "wood-one-bounce", one_bounce) else { return };
     one.assert_alike("wood-one-bounce");
-    let Some(many) = pair("wood", "wood-all-bounces", BOARDS, |_| ()) else { return };
+    let Some(many) = pair("wood", "wood-all-bounces", |_| ()) else { return };
     many.assert_alike("wood-all-bounces");
 
     let materials = many.materials();
@@ -179,11 +174,9 @@ fn the_boards_match_the_path_tracers_and_many_bounces_tint_them() {
     let mut pixels: Vec<usize> = (0..materials.len()).filter(white).collect();
     pixels.sort_by(|&a, &b| strength(b).total_cmp(&strength(a)));
     pixels.truncate(pixels.len() / 10);
-    // At the foot of a board the extrapolated field may fall to 0, here and there: no light has no hue.
-    let strongest = pixels.len();
-    let has_light = |image: &Image, pixel: usize| image.pixels()[pixel] != [0.0; 3];
-    pixels.retain(|&pixel| has_light(&many.ours, pixel) && has_light(&one.ours, pixel));
-    assert!((strongest - pixels.len()) * 100 <= strongest, "{} pixels are black", strongest - pixels.len());
+    // No light has no hue.
+    let black = |image: &Image| pixels.iter().filter(|&&pixel| image.pixels()[pixel] == [0.0; 3]).count();
+    assert_eq!((black(&many.ours), black(&one.ours)), (0, 0), "no surface there is without light");
     let mut errors = [0.0f32; 2];
     for pixel in &pixels {
         let theirs = tint(&many.theirs, &[*pixel]);

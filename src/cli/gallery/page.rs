@@ -59,9 +59,11 @@ impl Entry {
         ];
         for (name, kind) in [("direct mesh points", "direct"), ("indirect mesh points", "indirect")] {
             let total = count(&format!("/mesh_points/{kind}/total"));
+            let evaluated = count(&format!("/mesh_points/{kind}/evaluated"));
             if total > 0 {
-                let evaluated = grouped(count(&format!("/mesh_points/{kind}/evaluated")));
-                facts.push((name, format!("{evaluated} of {} evaluated", grouped(total))));
+                facts.push((name, format!("{} of {} evaluated", grouped(evaluated), grouped(total))));
+            } else if evaluated > 0 {
+                facts.push(("points on surfaces", format!("{} evaluated", grouped(evaluated))));
             }
         }
         for (name, kind) in [

@@ -13,9 +13,9 @@ use crate::simd::{LANES, Lanes};
 /// I at single surface points, from at most 16 occlusion rays each.
 #[derive(Default)]
 pub struct DirectLight {
-    /// By light, in the order of the packed lights: what a light gives the surface if nothing stands in its way.
+    /// By point and light, in the order of the packed lights: what a light gives the point if nothing stands in its way.
     unoccluded: Vec<f32>,
-    /// Lights that a ray is traced to, and what their light is multiplied by.
+    /// Points and lights that a ray is traced between, as indices of the above, and what their light is multiplied by.
     chosen: Vec<(usize, f32)>,
     /// Rays traced.
     pub rays: u64,
@@ -38,11 +38,25 @@ impl DirectLight {
         surface: &SurfacePoint,
         width: f32,
     ) -> Vec3 {
+        self.mean(accel, lights, &[*surface], width).0
+    }
+
+    /// Mean of I over some surface points, each of which stands for a square around it, and how uneven it is: the difference between the
+    /// most and the least, over the mean, 0 where all is dark.
+    #[inline(always)]
+    pub fn mean<A: Accel, const N: usize>(
+        &mut self,
+        accel: &A,
+        lights: &PackedLights,
+        surfaces: &[SurfacePoint; N],
+        width: f32,
+    ) -> (Vec3, f32) {
         self.unoccluded.clear();
-        lights.incident_at(
-            surface.position,
-            &mut Unoccluded { lights, surface, amounts: &mut self.unoccluded },
-        );
+        for surface in surfaces {
+            let amounts = &mut self.unoccluded;
+            lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+        }
+        let count = lights.chunks().len() * LANES;
         let above = self.unoccluded.iter().filter(|&&amount| amount > 0.0).count();
         self.chosen.clear();
         if above <= LANES {
@@ -51,7 +65,7 @@ impl DirectLight {
         } else {
             let step = self.unoccluded.iter().sum::<f32>() / LANES as f32;
             // How far it is from the sum of the lights before to the next step.
-            let mut ahead = hash_to_unit_cube(surface.position).x * step;
+            let mut ahead = hash_to_unit_cube(surfaces[0].position).x * step;
             for (light, &amount) in self.unoccluded.iter().enumerate() {
                 let steps = ((amount - ahead) / step).ceil().clamp(0.0, LANES as f32);
                 ahead += steps * step - amount;
@@ -63,11 +77,12 @@ impl DirectLight {
             self.chosen.truncate(LANES);
         }
         let mut packet = RayPacket::<LANES>::empty();
-        let (origin, mut active): (_, LaneMask) = (surface.ray_origin(), 0);
+        let mut active: LaneMask = 0;
         let singular = lights.falloff() == Falloff::InverseSquare;
         let near = if singular { width * width / (2.0 * PI) } else { 0.0 };
         for (lane, (light, factor)) in self.chosen.iter_mut().enumerate() {
-            let chunk = &lights.chunks()[*light / LANES];
+            let origin = surfaces[*light / count].ray_origin();
+            let chunk = &lights.chunks()[*light % count / LANES];
             let way = Vec3::from_array(chunk.to_light(*light % LANES, origin.to_array()));
             let squared = way.length_squared();
             if near > 0.0 && squared < 1e3 * near {
@@ -78,15 +93,20 @@ impl DirectLight {
         }
         self.rays += u64::from(active.count_ones());
         let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
-        let mut sum = Vec3::ZERO;
+        let (mut sum, mut amounts) = (Vec3::ZERO, [0.0f32; N]);
         for (lane, &(light, factor)) in self.chosen.iter().enumerate() {
             if blocked >> lane & 1 == 0 {
-                let intensity = Vec3::from_array(lights.intensity(light / LANES, light % LANES));
+                let intensity = Vec3::from_array(lights.intensity(light % count / LANES, light % LANES));
                 let amount = self.unoccluded[light] * factor;
+                amounts[light / count] += amount;
                 sum += intensity * (amount / intensity.element_sum());
             }
         }
-        sum
+        let most = amounts.iter().copied().fold(0.0, f32::max);
+        let least = amounts.iter().copied().fold(most, f32::min);
+        let count = N as f32;
+        let unevenness = if most > 0.0 { (most - least) * count / amounts.iter().sum::<f32>() } else { 0.0 };
+        (sum / count, unevenness)
     }
 }
 

@@ -63,7 +63,7 @@ impl IndirectMesh {
     pub(super) fn entries(&self) -> usize {
         match self.settings.form {
             IndirectForm::Scalar => 1,
-            IndirectForm::Directional => ENTRIES,
+            _ => ENTRIES,
         }
     }
 

@@ -88,7 +88,7 @@ impl IndirectView<'_> {
                     sum += Vec3::from_array(mesh.value(slot)[0]) * weight;
                 }
             }
-            IndirectForm::Directional => {
+            _ => {
                 let by_normal = OctahedralWeights::of(normal);
                 for (slot, weight) in points {
                     sum += by_normal.apply(mesh.value(slot)) * weight;

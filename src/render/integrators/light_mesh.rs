@@ -6,6 +6,7 @@ use pulp::NullaryFnOnce;
 use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
 use crate::light_mesh::lookup::LookupScratch;
+use crate::light_mesh::surface::PixelGroups;
 use crate::render::frame::BlockIntegrator;
 use crate::render::meshes::{LightMeshes, MeshInterpolation};
 use crate::render::need::needed_points;
@@ -68,11 +69,16 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         if let (Some(indirect), Some(view)) = (&meshes.indirect, &interpolation.indirect) {
             let indirect = indirect.view(view);
             let mut scratch = LookupScratch::for_tile();
-            for (vertex, light) in vertices.iter().zip(light) {
+            for (vertex, light) in vertices.iter().zip(&mut *light) {
                 *light += indirect.illumination(accel, &vertex.surface, &mut scratch);
             }
             counters.shadow_rays += scratch.rays;
             counters.indirect_fallbacks = scratch.fallbacks;
+        }
+        if let Some(mesh) = &meshes.surface {
+            let surfaces = vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
+            let groups = PixelGroups::new(surfaces, tile.pixels(), &mesh.view().footprint);
+            counters.shadow_rays += mesh.illuminate(accel, &groups, interpolation.surface_scale, light);
         }
         counters
     }

@@ -8,9 +8,7 @@ use super::values::{Count, Fraction, Stops};
 use crate::image::MAX_PIXELS;
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{
-    Estimator, IndirectForm, IndirectSettings, Integrator, Radius, Resolve, Settings, named_enum,
-};
+use crate::settings::{Estimator, IndirectSettings, Integrator, Radius, Resolve, Settings, named_enum};
 
 /// `[render]`
 #[derive(Default, Deserialize)]
@@ -47,11 +45,7 @@ impl PresetName {
                 shading.resolve = Resolve::Trace;
                 shading.kernel.radius = Radius::Spacings(1.5);
                 shading.indirect.at_surface = true;
-                mesh.indirect = Some(IndirectSettings {
-                    form: IndirectForm::Directional,
-                    bounces: 16,
-                    ..IndirectSettings::default()
-                });
+                mesh.indirect = Some(IndirectSettings { bounces: 16, ..IndirectSettings::default() });
             }
         }
     }

@@ -1,0 +1,411 @@
+//! Cells of space, and the surfaces in them: where the points of a surface mesh lie.
+
+use std::hash::{BuildHasherDefault, Hasher};
+
+use glam::Vec3;
+
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::sampling::mix;
+use crate::scene::{Ray, Scene, SurfacePoint};
+
+/// Cubes that space is cut into, level by level: each level halves the one before.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells {
+    /// Of a cube of level 0.
+    width: f32,
+}
+
+/// A cube.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// Level.
+    pub level: u8,
+    index: [i32; 3],
+}
+
+/// Where the cubes begin, in widths of level 0: nowhere near the round coordinates at which models have their walls, which would lie on
+/// the border of two cubes.
+const ORIGIN: Vec3 = Vec3::new(0.381_966, 0.236_068, 0.723_607);
+
+impl Cells {
+    /// Cubes of a width at level 0.
+    pub fn new(width: f32) -> Self {
+        Self { width }
+    }
+
+    /// Width of a cube.
+    #[inline(always)]
+    pub fn width(&self, level: u8) -> f32 {
+        self.width / f32::from(1u16 << level)
+    }
+
+    /// The cube that a position lies in.
+    #[inline(always)]
+    pub fn at(&self, level: u8, position: Vec3) -> Cell {
+        let scale = f32::from(1u16 << level);
+        let place = (position / self.width + ORIGIN) * scale;
+        // Rounded down, as `floor` does for numbers that fit; a call of which costs more than all the rest.
+        let down = |number: f32| {
+            let whole = number as i32;
+            whole.saturating_sub(i32::from(number < whole as f32))
+        };
+        Cell { level, index: place.to_array().map(down) }
+    }
+
+    /// The lower corner of a cube.
+    fn corner(&self, cell: Cell) -> Vec3 {
+        let scale = f32::from(1u16 << cell.level);
+        (Vec3::from_array(cell.index.map(|index| index as f32)) / scale - ORIGIN) * self.width
+    }
+
+    /// The other cubes of a level that a surface point is nearly in: those within a quarter of their width.
+    pub fn near(&self, level: u8, surface: &SurfacePoint) -> impl Iterator<Item = Cell> + use<> {
+        let position = surface.position;
+        let own = self.at(level, position);
+        let reach = Vec3::splat(0.25 * self.width(level));
+        let (low, high) = (self.at(level, position - reach).index, self.at(level, position + reach).index);
+        (low[0]..=high[0])
+            .flat_map(move |x| {
+                (low[1]..=high[1])
+                    .flat_map(move |y| (low[2]..=high[2]).map(move |z| Cell { level, index: [x, y, z] }))
+            })
+            .filter(move |cell| *cell != own)
+    }
+
+    /// The cubes around one that come closer to it than `reach` cubes, itself included, and that a surface in it could go on into: a plane
+    /// through a point of it, or one that bends a little.
+    pub fn around(&self, cell: Cell, surface: &SurfacePoint, reach: i32) -> impl Iterator<Item = Cell> + '_ {
+        let width = self.width(cell.level);
+        let (position, normal) = (surface.position, surface.shading_normal);
+        let steps = -reach..=reach;
+        steps.clone().flat_map(move |x| {
+            let steps = steps.clone();
+            steps.clone().flat_map(move |y| {
+                steps.clone().filter_map(move |z| {
+                    let index = [0, 1, 2].map(|axis| cell.index[axis].saturating_add([x, y, z][axis]));
+                    let other = Cell { level: cell.level, index };
+                    let height = (self.corner(other) + 0.5 * width - position).dot(normal);
+                    // Half of the cube's extent along the normal.
+                    let half = 0.5 * width * normal.abs().element_sum();
+                    (height.abs() <= half + 0.25 * width).then_some(other)
+                })
+            })
+        })
+    }
+}
+
+impl Cell {
+    /// One of 16 numbers, others for the cells of any square of 4×4 along the axes; those of 2×2 follow each other.
+    pub fn set(self) -> u8 {
+        let [x, y, z] = self.index;
+        let (a, b) = (x.wrapping_add(z) & 3, y.wrapping_add(z) & 3);
+        ((a & 1) | (b & 1) << 1 | (a & 2) << 1 | (b & 2) << 2) as u8
+    }
+
+    /// A hash: other cells practically never have the same.
+    #[inline(always)]
+    pub fn key(self) -> u64 {
+        let [x, y, z] = self.index.map(|number| u64::from(number as u32));
+        mix(mix(x | y << 32) ^ (z | u64::from(self.level) << 32))
+    }
+}
+
+/// A point that stands for a surface in a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct CellPoint {
+    /// The point.
+    pub surface: SurfacePoint,
+    /// Places spread over what it stands for.
+    pub spread: [Vec3; 4],
+    /// What falls on it from lights.
+    pub direct: Vec3,
+    /// Whether that is so uneven that smaller cells tell more.
+    pub uneven: bool,
+    /// Whether other points of the cell lie in about the same plane and are not seen by it.
+    pub divided: bool,
+}
+
+impl CellPoint {
+    /// A point that stands for itself alone.
+    pub fn alone(surface: &SurfacePoint) -> Self {
+        Self {
+            surface: *surface,
+            spread: [surface.position; 4],
+            direct: Vec3::ZERO,
+            uneven: false,
+            divided: false,
+        }
+    }
+
+    /// Points spread over what it stands for.
+    pub fn spread(&self) -> [SurfacePoint; 4] {
+        self.spread.map(|position| SurfacePoint { position, ..self.surface })
+    }
+}
+
+/// Lines through a cell along one axis: a square of 4×4.
+const LINES: usize = 16;
+/// Surfaces that one line may meet.
+const LAYERS: usize = 4;
+/// Surfaces that are told apart in a cell.
+const MOST_POINTS: usize = 16;
+/// Surfaces that face the same way, such as the fronts of the walls on either side of a thin room, or front and back of a wall made of two, are
+/// told apart by their planes where those are so many widths apart.
+const LAYER: f32 = 0.1;
+/// Cosine between normals of one surface.
+const SAME_WAY: f32 = 0.8;
+/// Fewer than one in so many points of a surface may be hidden from the one that stands for it.
+const HIDDEN_OF: u32 = 16;
+/// Times that a surface may be divided by walls.
+const MOST_DIVISIONS: usize = 4;
+
+/// How far above surfaces the lines run that tell whether two points see each other, in widths of a cell: so far that a surface which
+/// bends doesn't hide its own points.
+pub const LIFT: f32 = 0.08;
+
+/// The line between two surface points, a little above both.
+#[inline(always)]
+pub fn line_between(a: &SurfacePoint, b: &SurfacePoint, width: f32) -> Ray {
+    let above =
+        |point: &SurfacePoint| point.position + point.geometric_normal * (point.offset + LIFT * width);
+    Ray::between(above(a), above(b))
+}
+
+/// Finds the surfaces in a cell, each by a point in its middle: both sides of whatever lines through the cell along the three axes
+/// meet. Points belong together if they face about the same way and see each other: light would leak under a thin wall.
+///
+/// Also returns the number of rays.
+pub fn survey<A: Accel>(accel: &A, scene: &Scene, cells: &Cells, cell: Cell) -> (Vec<CellPoint>, u64) {
+    let (width, corner) = (cells.width(cell.level), cells.corner(cell));
+    let (mut surfaces, mut rays): (Vec<Vec<SurfacePoint>>, u64) = (Vec::new(), 0);
+    for axis in 0..3 {
+        let along = Vec3::AXES[axis];
+        let across = [Vec3::AXES[(axis + 1) % 3], Vec3::AXES[(axis + 2) % 3]];
+        let origin = |line: usize| {
+            let place = |number: usize| (number as f32 + 0.5) / 4.0 * width;
+            corner + across[0] * place(line % 4) + across[1] * place(line / 4)
+        };
+        let mut from = [0.0f32; LINES];
+        let mut active: LaneMask = (1 << LINES) - 1;
+        for _ in 0..LAYERS {
+            let mut packet = RayHitPacket::<LINES>::empty();
+            for (line, &t_near) in from.iter().enumerate() {
+                packet.set_lane(line, &Ray { t_near, t_far: width, ..Ray::new(origin(line), along) });
+            }
+            rays += u64::from(active.count_ones());
+            accel.intersect_packet(active, &mut packet, Coherence::Coherent);
+            for (line, from) in from.iter_mut().enumerate() {
+                let hit = if active >> line & 1 == 1 { hit_of_lane(&packet, line) } else { None };
+                let Some(hit) = hit else {
+                    active &= !(1 << line);
+                    continue;
+                };
+                for direction in [along, -along] {
+                    let point = scene.interaction(&hit, direction).point;
+                    *from = hit.t + 2.0 * point.offset + 1e-3 * width;
+                    let alike = |surface: &Vec<SurfacePoint>| {
+                        surface[0].shading_normal.dot(point.shading_normal) > SAME_WAY
+                    };
+                    match surfaces.iter().position(alike) {
+                        Some(number) => surfaces[number].push(point),
+                        None if surfaces.len() < MOST_POINTS => surfaces.push(vec![point]),
+                        None => {}
+                    }
+                }
+            }
+            if active == 0 {
+                break;
+            }
+        }
+    }
+    let mut points = Vec::with_capacity(surfaces.len());
+    for surface in surfaces {
+        rays += divide(accel, surface, width, &mut points);
+    }
+    (points, rays)
+}
+
+/// Adds points for one surface, several if they don't see each other; returns the number of rays.
+fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut Vec<CellPoint>) -> u64 {
+    let mut groups: Vec<Vec<SurfacePoint>> = Vec::new();
+    let (mut left, mut rays) = (surface, 0);
+    let mut members_of = Vec::new();
+    while !left.is_empty() && groups.len() < MOST_DIVISIONS {
+        let middle = left.iter().map(|point| point.position).sum::<Vec3>() / left.len() as f32;
+        let distance = |point: &SurfacePoint| point.position.distance_squared(middle);
+        let best = (0..left.len()).min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b])));
+        // The point that stands for the group comes first.
+        let best = left[best.unwrap_or_default()];
+        let mut group = vec![best];
+        let mut hidden = Vec::new();
+        for points in left.chunks(LINES) {
+            let mut packet = RayPacket::<LINES>::empty();
+            for (lane, point) in points.iter().enumerate() {
+                packet.set_lane(lane, &line_between(&best, point, width));
+            }
+            // A point sees itself.
+            let other = |lane: &usize| points[*lane] != best;
+            let active: LaneMask = (0..points.len()).filter(other).fold(0, |mask, lane| mask | 1 << lane);
+            rays += u64::from(active.count_ones());
+            let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent) & active;
+            for (lane, point) in points.iter().enumerate() {
+                if blocked >> lane & 1 == 1 { hidden.push(*point) } else { group.push(*point) }
+            }
+        }
+        members_of.push(group[1..].iter().map(|point| point.position).collect::<Vec<Vec3>>());
+        groups.push(group);
+        if (hidden.len() as u32) * HIDDEN_OF < left.len() as u32 {
+            break;
+        }
+        left = hidden;
+    }
+    for (number, group) in groups.iter().enumerate() {
+        let others = groups.iter().enumerate().filter(|(other, _)| *other != number);
+        let (point, members) = (group[0], &members_of[number]);
+        let divided = others.into_iter().any(|(_, other)| {
+            let near = |point: &SurfacePoint, other: &SurfacePoint| {
+                (other.position - point.position).dot(point.shading_normal).abs() < LAYER * width
+            };
+            other.iter().any(|other| near(&point, other)) || group.iter().any(|point| near(&other[0], point))
+        });
+        // Lines run row by row: steps of a quarter and one spread over rows and columns.
+        let spread = [0, 1, 2, 3].map(|k| members[k * (members.len() + 4) / 4 % members.len()]);
+        out.push(CellPoint { spread, divided, ..CellPoint::alone(&point) });
+    }
+    rays
+}
+
+/// Hasher of keys that are hashes already.
+#[derive(Default)]
+pub struct KeyHasher(u64);
+
+/// Builds [`KeyHasher`]s.
+pub type BuildKeyHasher = BuildHasherDefault<KeyHasher>;
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = mix(self.0 ^ u64::from(byte));
+        }
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::accel::BruteForceAccel;
+    use crate::scene::TriangleMesh;
+
+    /// Parallelograms, each given by its middle and half of its edges.
+    fn scene(parts: &[(Vec3, Vec3, Vec3)]) -> Scene {
+        let corners = |&(middle, u, v): &(Vec3, Vec3, Vec3)| {
+            [middle - u - v, middle + u - v, middle + u + v, middle - u + v].map(|corner| corner.to_array())
+        };
+        let positions = parts.iter().flat_map(corners).collect();
+        let triangles =
+            (0..parts.len() as u32).flat_map(|i| [[0, 1, 2], [0, 2, 3]].map(|t| t.map(|c| 4 * i + c)));
+        let mut scene = Scene::new();
+        scene.add(TriangleMesh::new(positions, triangles.collect()));
+        scene
+    }
+
+    const CELLS: Cells = Cells { width: 1.0 };
+
+    /// The points of the cell around the origin.
+    fn points(parts: &[(Vec3, Vec3, Vec3)]) -> Vec<CellPoint> {
+        let scene = scene(parts);
+        survey(&BruteForceAccel::new(&scene), &scene, &CELLS, CELLS.at(0, Vec3::ZERO)).0
+    }
+
+    const FLOOR: (Vec3, Vec3, Vec3) = (Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 3.0));
+
+    /// The middle of the cell around the origin, which is not a corner of cells.
+    fn middle() -> Vec3 {
+        CELLS.corner(CELLS.at(0, Vec3::ZERO)) + 0.5
+    }
+
+    /// A wall of no thickness across the cell, that stands on the floor.
+    fn wall() -> (Vec3, Vec3, Vec3) {
+        (Vec3::new(middle().x, 0.0, 0.0), 3.0 * Vec3::Y, 3.0 * Vec3::Z)
+    }
+
+    #[test]
+    fn an_empty_cell_has_no_points() {
+        assert!(points(&[(Vec3::splat(5.0), Vec3::X, Vec3::Z)]).is_empty());
+    }
+
+    /// Both sides of a floor have a point near the middle of the cell, and there is nothing to ask about.
+    #[test]
+    fn a_floor_has_a_point_on_either_side() {
+        let points = points(&[FLOOR]);
+        assert_eq!(points.len(), 2);
+        for (point, side) in points.iter().zip([1.0, -1.0]) {
+            let offset = (point.surface.position - middle()) * Vec3::new(1.0, 0.0, 1.0);
+            assert!(offset.abs().max_element() <= 0.25, "{offset}");
+            assert!(!point.divided);
+            assert!(points.iter().any(|point| point.surface.shading_normal == side * Vec3::Y));
+        }
+    }
+
+    /// A wall divides the floor: each side of it has a point of its own, which surface points have to ask whether they see it.
+    #[test]
+    fn a_wall_divides_the_floor() {
+        let points = points(&[FLOOR, wall()]);
+        let upper: Vec<&CellPoint> =
+            points.iter().filter(|point| point.surface.shading_normal == Vec3::Y).collect();
+        let sides: Vec<f32> =
+            upper.iter().map(|point| (point.surface.position.x - middle().x).signum()).collect();
+        assert!(sides.contains(&1.0) && sides.contains(&-1.0), "{sides:?}");
+        assert!(upper.iter().all(|point| point.divided));
+    }
+
+    /// Two floors above each other need no question: the plane tells.
+    #[test]
+    fn storeys_are_told_apart_by_their_planes() {
+        let upper = (Vec3::Y * 0.2, FLOOR.1, FLOOR.2);
+        let points = points(&[FLOOR, upper]);
+        assert_eq!(points.len(), 4);
+        assert!(points.iter().all(|point| !point.divided));
+    }
+
+    /// Interpolation mixes the cells of a neighbourhood; each gives it other directions.
+    #[test]
+    fn cells_of_a_square_have_different_sets() {
+        let base = CELLS.at(1, Vec3::splat(-7.3)).index;
+        for plane in 0..3 {
+            let sets: HashSet<u8> = (0..16)
+                .map(|number| {
+                    let mut index = base;
+                    index[plane] += number / 4;
+                    index[(plane + 1) % 3] += number % 4;
+                    Cell { level: 1, index }.set()
+                })
+                .collect();
+            assert_eq!(sets.len(), 16);
+        }
+    }
+
+    /// No position panics, however far, and each lies in its cell.
+    #[test]
+    fn every_position_has_a_cell() {
+        for x in [0.0, -3.7, 1e30, f32::INFINITY, f32::NAN] {
+            for level in 0..4 {
+                let surface = SurfacePoint::flat(Vec3::new(x, 0.3, -1e12), Vec3::Y);
+                assert!(CELLS.near(level, &surface).count() < 27);
+                let cell = CELLS.at(level, Vec3::splat(-3.7));
+                let inside = (Vec3::splat(-3.7) - CELLS.corner(cell)) / CELLS.width(level);
+                assert!(inside.cmpge(Vec3::ZERO).all() && inside.cmple(Vec3::ONE).all(), "{inside}");
+            }
+        }
+    }
+}

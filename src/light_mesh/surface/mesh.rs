@@ -1,0 +1,498 @@
+//! The surface mesh: its points, and the light that is known at them.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::directions::{HemisphereDirections, half, quarter};
+use super::gather::{Gather, Gathered, GatheredRay};
+use super::interpolate::{interpolate, neighbours};
+use super::pixels::PixelGroups;
+use super::points::{FINEST, LastPlace, NO_POINT, SurfacePoints};
+use super::solve::FallingLight;
+use crate::accel::Accel;
+use crate::scene::{PixelFootprint, SurfacePoint};
+use crate::settings::IndirectSettings;
+use crate::world::World;
+
+/// Points on surfaces with the light that falls on them from other surfaces.
+///
+/// Points that surface points are interpolated from, records, gather with all directions; a quarter of these tell first whether smaller
+/// cells should take their place. What the rays hit is lit by lights at points of cells that are smaller where that light is uneven; light
+/// from surfaces is less so, and comes from points of level 0, sources, which gather it with half of the directions.
+pub struct SurfaceMesh {
+    settings: IndirectSettings,
+    points: SurfacePoints,
+    directions: HemisphereDirections,
+    /// The view that is rendered.
+    view: SurfaceView,
+    /// By point.
+    states: Vec<State>,
+    light: FallingLight,
+    /// By point: what falls on records from surfaces over π.
+    received: Vec<Vec3>,
+    /// Records that surface points around each are interpolated from, by point: stretches of `lists`.
+    list_of: Vec<Range<u32>>,
+    lists: Vec<u32>,
+    /// What points that were looked at see, until they are evaluated.
+    looked: Gathered,
+    /// Records of the view.
+    records: Vec<u32>,
+}
+
+/// How fine a picture is.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceView {
+    /// Pixels where camera rays end.
+    pub footprint: PixelFootprint,
+    /// Rows of pixels.
+    pub height: u32,
+}
+
+/// What is known of a point.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    /// Where what it sees is among the looked at, plus one.
+    looked_at: u32,
+    /// Harmonic mean distance of the surfaces that it sees, 0 if it has not been looked at.
+    distance: f32,
+    /// Whether light from surfaces is known: as a record, as a source.
+    received: bool,
+    solved: bool,
+    /// Whether rays end at it.
+    seen: bool,
+    /// Whether it is a record of the view.
+    listed: bool,
+}
+
+/// Widths of the cells of records: at most this part of the harmonic mean distance of what they see, which is how fast light changes there (Ward
+/// and Heckbert, 1992), but not so few pixels that it can't be seen.
+const WIDTH_PER_DISTANCE: f32 = 1.0 / 3.0;
+const LEAST_PIXELS: f32 = 4.0;
+/// Cells of records are at most so many pixels wide, or that part of the picture's height, whichever is more: the number of records does not
+/// grow with the picture.
+const MOST_PIXELS: f32 = 8.0;
+const MOST_OF_HEIGHT: f32 = 1.0 / 32.0;
+/// Width of cells, per distance along a ray, that tell uneven light of lights apart.
+const FINENESS: f32 = 0.15;
+/// Part of the light of records that sources may leave out that send little of it.
+const LEFT_OUT: f32 = 5e-4;
+
+/// What the evaluation of a surface mesh took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceEvaluation {
+    /// Points that gathered light.
+    pub evaluated: u64,
+    /// Points that surface points are interpolated from.
+    pub needed: u64,
+    /// Rays that gather.
+    pub rays: u64,
+    /// Occlusion rays, and rays that look for surfaces in cells.
+    pub shadow: u64,
+}
+
+impl SurfaceMesh {
+    /// With no point known; cells have the given width.
+    pub fn new(settings: &IndirectSettings, width: f32) -> Self {
+        let footprint = PixelFootprint { eye: Vec3::ZERO, edge: 0.0 };
+        Self {
+            settings: settings.clone(),
+            points: SurfacePoints::new(width),
+            directions: HemisphereDirections::new(settings.directions),
+            view: SurfaceView { footprint, height: 1 },
+            states: Vec::new(),
+            light: FallingLight::default(),
+            received: Vec::new(),
+            list_of: Vec::new(),
+            lists: Vec::new(),
+            looked: Gathered::default(),
+            records: Vec::new(),
+        }
+    }
+
+    /// Turns to another view: surface points that are needed from now on belong to it.
+    pub fn turn_to(&mut self, view: SurfaceView) {
+        self.view = view;
+        self.records.iter().for_each(|&number| self.states[number as usize].listed = false);
+        self.records.clear();
+        self.lists.clear();
+    }
+
+    /// The view that it was turned to.
+    pub fn view(&self) -> &SurfaceView {
+        &self.view
+    }
+
+    /// Takes in the surface points of some tiles that are going to be interpolated.
+    pub fn need<'s, A: Accel>(
+        &mut self,
+        world: World<A>,
+        tiles: Vec<Vec<&'s SurfacePoint>>,
+    ) -> SurfaceEvaluation {
+        let mut evaluation = SurfaceEvaluation::default();
+        struct Left<'s> {
+            surface: &'s SurfacePoint,
+            /// Level to look into next.
+            level: u8,
+            /// The last point that was found has to do where smaller cells have none.
+            found: Option<u32>,
+        }
+        let left = |surface| Left { surface, level: self.first_level(surface), found: None };
+        let mut tiles: Vec<Vec<Left>> =
+            tiles.into_par_iter().map(|tile| tile.into_iter().map(left).collect()).collect();
+        let mut records = Vec::new();
+        for level in 0..=FINEST {
+            let of_level = |tile: &Vec<Left<'s>>| {
+                tile.iter().filter(|left| left.level == level).map(|left| left.surface).collect()
+            };
+            let tasks: Vec<Vec<&SurfacePoint>> = tiles.par_iter().map(of_level).collect();
+            let (found, rays) = self.points.place(world, level, &tasks);
+            evaluation.shadow += rays;
+            self.extend();
+            let found_numbers = numbers(&found);
+            let unknown = |number: &u32| self.states[*number as usize].distance == 0.0;
+            let new = found_numbers.iter().copied().filter(unknown).collect();
+            self.look(world, new, &mut evaluation);
+            records.extend(found_numbers.into_iter().filter(|&number| !self.refined(number)));
+            tiles.par_iter_mut().zip(found).for_each(|(tile, found)| {
+                let mut found = found.into_iter();
+                tile.retain_mut(|left| {
+                    if left.level != level {
+                        return true;
+                    }
+                    let place = found.next().flatten();
+                    left.level += 1;
+                    left.found = place.or(left.found);
+                    place.is_none_or(|number| self.refined(number))
+                });
+            });
+        }
+        for Left { surface, found, .. } in tiles.into_iter().flatten() {
+            records.push(found.unwrap_or_else(|| self.points.own(world, surface)));
+        }
+        self.extend();
+        let states = &mut self.states;
+        records.retain(|&number| !std::mem::replace(&mut states[number as usize].listed, true));
+        self.records.extend(records);
+        evaluation
+    }
+
+    /// Finds which records of the view surface points around each record are interpolated from; returns the number of rays.
+    fn list<A: Accel>(&mut self, accel: &A) -> u64 {
+        let (points, states) = (&self.points, &self.states);
+        let lists: Vec<(Vec<u32>, u64)> = self
+            .records
+            .par_iter()
+            .map(|&number| {
+                let mut list = Vec::new();
+                let rays =
+                    neighbours(accel, points, number, |other| states[other as usize].listed, &mut list);
+                (list, rays)
+            })
+            .collect();
+        for (&number, (list, _)) in self.records.iter().zip(&lists) {
+            let first = self.lists.len() as u32;
+            self.lists.extend_from_slice(list);
+            self.list_of[number as usize] = first..self.lists.len() as u32;
+        }
+        lists.iter().map(|(_, rays)| rays).sum()
+    }
+
+    /// Evaluates the records of the view, and all that they depend on; `scale` is that of direct light.
+    pub fn evaluate<A: Accel>(&mut self, world: World<A>, scale: f32) -> SurfaceEvaluation {
+        let mut evaluation = SurfaceEvaluation::default();
+        self.light.scale = scale;
+        // Sums must not depend on the order in which points were found.
+        self.records.sort_by_cached_key(|&number| self.points.key(number));
+        evaluation.shadow += self.list(world.accel);
+        let states = &self.states;
+        let unknown = |number: &u32| !states[*number as usize].received;
+        let new: Vec<u32> = self.records.iter().copied().filter(unknown).collect();
+        evaluation.needed = self.records.len() as u64;
+        evaluation.evaluated = new.len() as u64;
+        let count = self.settings.directions;
+        self.look(world, new.clone(), &mut evaluation);
+        let rest = self.gather(world, quarter(count)..count, FINENESS, new.clone(), &mut evaluation);
+        let sight = Sight { looked: std::mem::take(&mut self.looked), rest, records: new, count };
+        let looked_at = |number: &u32| self.states[*number as usize].looked_at as usize - 1;
+        let looked_at: Vec<usize> = sight.records.iter().map(looked_at).collect();
+        sight.looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
+
+        let (sources, ends) = self.find_sources(world, &sight, &looked_at, &mut evaluation);
+        self.light.total_up(&self.points, &ends);
+        let IndirectSettings { bounces, tolerance, .. } = self.settings;
+        sources.solve(&self.points, &ends, &mut self.light, bounces.saturating_sub(1), tolerance);
+        let mut received = sight.received(&looked_at, &self.light.total);
+        if self.correct(&sources, &sight.records, &received) {
+            self.light.total_up(&self.points, &ends);
+            received = sight.received(&looked_at, &self.light.total);
+        }
+        for (&number, light) in sight.records.iter().zip(received) {
+            self.received[number as usize] = light;
+            self.states[number as usize].received = true;
+        }
+        evaluation
+    }
+
+    /// Lets sources gather that matter for what records see. Returns what they see, and the points that light is sent on from for the first
+    /// time.
+    ///
+    /// A source matters by how much of its light arrives at the records, over one bounce or several. Those that together matter least
+    /// are left out: in a house of many rooms it is most.
+    fn find_sources<A: Accel>(
+        &mut self,
+        world: World<A>,
+        sight: &Sight,
+        looked_at: &[usize],
+        evaluation: &mut SurfaceEvaluation,
+    ) -> (Gathered, Vec<u32>) {
+        let weight = 1.0 / sight.records.len().max(1) as f32;
+        let share = weight / self.settings.directions.max(1) as f32;
+        let mut carried: Vec<(u32, f32)> = sight.rays(looked_at).map(|ray| ray.carries(share)).collect();
+        let mut new = self.first_seen(&carried);
+        let (mut ends, mut sources) = (new.clone(), Gathered::default());
+        if self.settings.bounces < 2 {
+            return (sources, ends);
+        }
+        let mut importance = HashMap::<u32, f32>::new();
+        loop {
+            evaluation.shadow += self.points.link(world, &new);
+            self.extend();
+            for (number, amount) in carried.drain(..).filter(|(number, _)| *number != NO_POINT) {
+                let parent = self.points.parent(number);
+                if parent != NO_POINT && !self.states[parent as usize].solved {
+                    *importance.entry(parent).or_default() += amount;
+                }
+            }
+            let Some(chosen) = self.choose(&mut importance) else { break };
+            let numbers = chosen.iter().map(|&(number, _)| number).collect();
+            let count = half(self.settings.directions);
+            // Light of lights matters less after two bounces: wide cells will do.
+            let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
+            evaluation.evaluated += gathered.points.len() as u64;
+            for (rays, (_, amount)) in gathered.rays.chunks(count as usize).zip(&chosen) {
+                carried.extend(rays.iter().map(|ray| ray.carries(amount / count as f32)));
+            }
+            new = self.first_seen(&carried);
+            ends.extend(&new);
+            sources.append(gathered);
+        }
+        (sources, ends)
+    }
+
+    /// Takes sources out of those that some importance is known of, all but the least important; `None` if no other is left.
+    fn choose(&mut self, importance: &mut HashMap<u32, f32>) -> Option<Vec<(u32, f32)>> {
+        let mut sources: Vec<(u32, f32)> =
+            importance.iter().map(|(&number, &amount)| (number, amount)).collect();
+        let points = &self.points;
+        sources.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| points.key(a.0).cmp(&points.key(b.0))));
+        let mut left_out = 0.0;
+        let first = sources.iter().position(|(_, amount)| {
+            left_out += amount;
+            left_out > LEFT_OUT
+        })?;
+        let mut chosen = sources.split_off(first);
+        chosen.sort_by_cached_key(|&(number, _)| points.key(number));
+        for (number, _) in &chosen {
+            importance.remove(number);
+            self.states[*number as usize].solved = true;
+        }
+        Some(chosen)
+    }
+
+    /// Puts what records receive in place of what new sources around them do, for they know better; returns whether there were any.
+    fn correct(&mut self, sources: &Gathered, records: &[u32], received: &[Vec3]) -> bool {
+        let new: HashSet<u32> = sources.points.iter().copied().collect();
+        let mut sums = HashMap::<u32, (Vec3, f32)>::new();
+        for (&number, light) in records.iter().zip(received) {
+            let parent = self.points.parent(number);
+            if new.contains(&parent) {
+                let (sum, count) = sums.entry(parent).or_default();
+                *sum += *light;
+                *count += 1.0;
+            }
+        }
+        for (&parent, (sum, count)) in &sums {
+            self.light.indirect[parent as usize] = sum / count;
+        }
+        !sums.is_empty()
+    }
+
+    /// Those of the points that light is sent on from for the first time.
+    fn first_seen(&mut self, carried: &[(u32, f32)]) -> Vec<u32> {
+        let states = &mut self.states;
+        let new =
+            |&number: &u32| number != NO_POINT && !std::mem::replace(&mut states[number as usize].seen, true);
+        carried.iter().map(|&(number, _)| number).filter(new).collect()
+    }
+
+    /// Lets points that may become records look around, which shows how near other surfaces are.
+    fn look<A: Accel>(&mut self, world: World<A>, mut numbers: Vec<u32>, evaluation: &mut SurfaceEvaluation) {
+        numbers.retain(|&number| self.states[number as usize].looked_at == 0);
+        let count = quarter(self.settings.directions);
+        let gathered = self.gather(world, 0..count, FINENESS, numbers, evaluation);
+        for (index, (&number, &closeness)) in gathered.points.iter().zip(&gathered.closeness).enumerate() {
+            let state = &mut self.states[number as usize];
+            state.looked_at = (self.looked.points.len() + index) as u32 + 1;
+            state.distance = count as f32 / closeness.max(f32::MIN_POSITIVE);
+        }
+        self.looked.append(gathered);
+    }
+
+    fn gather<A: Accel>(
+        &mut self,
+        world: World<A>,
+        range: Range<u32>,
+        fineness: f32,
+        numbers: Vec<u32>,
+        evaluation: &mut SurfaceEvaluation,
+    ) -> Gathered {
+        let share = range.len() as u32 * self.settings.emitter_samples;
+        let gather = Gather {
+            world,
+            directions: &self.directions,
+            emitter_samples: share / self.settings.directions.max(1),
+            range,
+            fineness,
+        };
+        let (gathered, shadow) = gather.run(&mut self.points, numbers);
+        evaluation.rays += gathered.rays.len() as u64;
+        evaluation.shadow += shadow;
+        self.extend();
+        gathered
+    }
+
+    /// The widest cell that a record may have at a position, and the narrowest that could be seen there.
+    #[inline(always)]
+    fn limits(&self, position: Vec3) -> (f32, f32) {
+        let SurfaceView { footprint, height } = self.view;
+        let pixel = footprint.edge * position.distance(footprint.eye);
+        (MOST_PIXELS.max(MOST_OF_HEIGHT * height as f32) * pixel, LEAST_PIXELS * pixel)
+    }
+
+    /// The level of the first cell to look into for a record.
+    #[inline(always)]
+    fn first_level(&self, surface: &SurfacePoint) -> u8 {
+        self.points.level_of(self.limits(surface.position).0)
+    }
+
+    /// Whether smaller cells should take the place of a point that was looked at.
+    #[inline(always)]
+    fn refined(&self, number: u32) -> bool {
+        let (most, least) = self.limits(self.points.surface(number).position);
+        let width = WIDTH_PER_DISTANCE * self.states[number as usize].distance;
+        self.points.level(number) < FINEST && self.points.width(number) > width.min(most).max(least)
+    }
+
+    /// Makes room for points that were added.
+    fn extend(&mut self) {
+        let count = self.points.len();
+        self.states.resize(count, State::default());
+        self.light.resize(count);
+        self.received.resize(count, Vec3::ZERO);
+        self.list_of.resize(count, 0..0);
+    }
+
+    /// Adds what the points of some groups, which were needed, receive from surfaces, over π and times `scale`, to their light, in the order in which they were
+    /// grouped; counts rays.
+    #[inline(always)]
+    pub fn illuminate<A: Accel>(
+        &self,
+        accel: &A,
+        groups: &PixelGroups,
+        scale: f32,
+        light: &mut [Vec3],
+    ) -> u64 {
+        let mut scratch = SurfaceScratch::default();
+        let values: Vec<Vec3> = groups
+            .groups
+            .iter()
+            .map(|group| match self.place(accel, &group.first, &mut scratch) {
+                Some(number) => {
+                    let list = self.list_of[number as usize].clone();
+                    let list = self.lists.get(list.start as usize..list.end as usize).unwrap_or_default();
+                    interpolate(&self.points, &group.middle(), list, &self.received)
+                }
+                None => Vec3::ZERO,
+            })
+            .collect();
+        for (light, &group) in light.iter_mut().zip(&groups.group_of) {
+            *light += values[group as usize] * scale;
+        }
+        scratch.rays
+    }
+
+    #[inline(always)]
+    fn place<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut SurfaceScratch,
+    ) -> Option<u32> {
+        let mut found = None;
+        for level in self.first_level(surface)..=FINEST {
+            let last = &mut scratch.last[usize::from(level)];
+            let place = last.find(&self.points, accel, level, surface, &mut scratch.rays);
+            let place = place.or_else(|| self.points.find_near(accel, level, surface, &mut scratch.rays));
+            found = place.or(found);
+            if place.is_some_and(|number| !self.refined(number)) {
+                break;
+            }
+        }
+        found.or_else(|| self.points.find_own(surface))
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.points.memory_bytes()
+            + self.states.capacity() * size_of::<State>()
+            + (2 * self.light.total.capacity() + self.received.capacity()) * size_of::<Vec3>()
+            + self.list_of.capacity() * size_of::<Range<u32>>()
+            + self.lists.capacity() * size_of::<u32>()
+    }
+}
+
+/// What records see: with the quarter of the directions with which they were looked at, and with the rest.
+struct Sight {
+    looked: Gathered,
+    rest: Gathered,
+    records: Vec<u32>,
+    /// Directions.
+    count: u32,
+}
+
+impl Sight {
+    /// All rays, record by record, given where each is among the looked at.
+    fn rays<'a>(&'a self, looked_at: &'a [usize]) -> impl Iterator<Item = GatheredRay> + 'a {
+        looked_at.iter().enumerate().flat_map(|(index, &looked_at)| {
+            self.looked.rays_of(looked_at).iter().chain(self.rest.rays_of(index)).copied()
+        })
+    }
+
+    /// What each record receives, given what falls on each point.
+    fn received(&self, looked_at: &[usize], total: &[Vec3]) -> Vec<Vec3> {
+        let share = 1.0 / self.count.max(1) as f32;
+        let of = |(index, &looked_at): (usize, &usize)| {
+            (self.looked.sum(looked_at, total) + self.rest.sum(index, total)) * share
+        };
+        looked_at.par_iter().enumerate().with_min_len(64).map(of).collect()
+    }
+}
+
+/// Working memory and counters of one thread.
+#[derive(Default)]
+struct SurfaceScratch {
+    last: [LastPlace; FINEST as usize + 1],
+    /// Occlusion rays.
+    rays: u64,
+}
+
+/// The numbers of points that were found, each once.
+fn numbers(tasks: &[Vec<Option<u32>>]) -> Vec<u32> {
+    let mut seen = HashSet::new();
+    let mut last = None;
+    let new = |&number: &u32| last.replace(number) != Some(number) && seen.insert(number);
+    tasks.iter().flatten().flatten().copied().filter(new).collect()
+}

@@ -1,0 +1,13 @@
+//! The surface mesh: indirect light at points that lie on surfaces (docs/method.md §5).
+
+mod cells;
+mod directions;
+mod gather;
+mod interpolate;
+mod mesh;
+mod pixels;
+mod points;
+mod solve;
+
+pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
+pub use pixels::PixelGroups;
