@@ -34,6 +34,9 @@ pub struct Overrides {
     /// Distance between mesh points: one number, X,Y,Z, or auto
     #[arg(long, value_name = "S", value_parser = parse::spacing)]
     spacing: Option<Spacing>,
+    /// Times that light passes between surfaces, or off
+    #[arg(long, value_name = "BOUNCES", value_parser = parse::bounces)]
+    indirect: Option<Bounces>,
     /// Size of the image
     #[arg(long, value_name = "WxH", value_parser = parse::resolution)]
     resolution: Option<(u32, u32)>,
@@ -45,9 +48,27 @@ pub struct Overrides {
     pub exposure: Option<f32>,
 }
 
+/// How often light passes between surfaces; 0 is never.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounces(pub u32);
+
 impl Overrides {
     /// Replaces the settings that flags were given for.
     pub fn apply(&self, settings: &mut Settings) {
+        self.apply_to_direct_light(settings);
+        match self.indirect {
+            Some(Bounces(0)) => settings.mesh.indirect = None,
+            Some(Bounces(bounces)) => {
+                if settings.mesh.indirect.is_none() {
+                    settings.derive_indirect();
+                }
+                settings.mesh.indirect.iter_mut().for_each(|indirect| indirect.bounces = bounces);
+            }
+            None => {}
+        }
+    }
+
+    fn apply_to_direct_light(&self, settings: &mut Settings) {
         let Settings { view, mesh, shading, output } = settings;
         set(&mut shading.integrator, self.integrator);
         set(&mut shading.reference_samples, self.reference_samples);

@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use glam::Vec3;
 
+use super::overrides::Bounces;
 use crate::image::MAX_PIXELS;
 use crate::settings::{MAX_EXPOSURE, Radius, Spacing};
 
@@ -64,6 +65,15 @@ pub fn radius(text: &str) -> Result<Radius, String> {
     match text.strip_suffix('s') {
         Some(spacings) => positive(spacings).map(Radius::Spacings),
         None => positive(text).map(Radius::Units),
+    }
+}
+
+/// Times that light passes between surfaces: 1 to 1000, or off.
+pub fn bounces(text: &str) -> Result<Bounces, String> {
+    match text.parse() {
+        Ok(bounces @ 1..=1000) => Ok(Bounces(bounces)),
+        _ if text == "off" => Ok(Bounces(0)),
+        _ => Err("a number from 1 to 1000, or off".to_owned()),
     }
 }
 

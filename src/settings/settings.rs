@@ -1,6 +1,6 @@
 //! All settings of a render, in one value.
 
-use super::mesh::MeshSettings;
+use super::mesh::{IndirectForm, IndirectSettings, MeshSettings};
 use super::output::OutputSettings;
 use super::shading::ShadingSettings;
 use super::view::ViewSettings;
@@ -16,4 +16,16 @@ pub struct Settings {
     pub shading: ShadingSettings,
     /// How files are written.
     pub output: OutputSettings,
+}
+
+impl Settings {
+    /// Adds indirect light if there is none, and lets its form, points and kernel follow from the settings of direct light (method §5).
+    pub fn derive_indirect(&mut self) -> &mut IndirectSettings {
+        let Self { mesh, shading, .. } = self;
+        let indirect = mesh.indirect.get_or_insert_default();
+        indirect.form = if shading.lambertian { IndirectForm::Surface } else { IndirectForm::Directional };
+        indirect.points = IndirectSettings::coarser_points(&mesh.direct);
+        shading.indirect.kernel = IndirectSettings::wider_kernel(&shading.kernel);
+        indirect
+    }
 }

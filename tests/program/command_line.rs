@@ -135,6 +135,32 @@ fn tolerances_have_one_range_and_one_meaning() {
     }
 }
 
+/// Indirect light can be had and left out from the command line: with as many bounces as a scene file's table asks for, or none.
+#[test]
+fn indirect_light_can_be_added_and_left_out() {
+    let folder = folder("0");
+    let plain = SCENE.replace("EXPOSURE", "0");
+    let lit = format!("{plain}[light_mesh.indirect]\nbounces = 2\n");
+    for (name, text) in [("plain.toml", &plain), ("lit.toml", &lit)] {
+        fs::write(folder.path().join(name), text).expect("writable");
+    }
+    let render = |scene: &str, image: &str, flags: &[&str]| {
+        let arguments = ["render", scene, "--quiet", "--backend", "bvh", "-o", image];
+        lightmesh(folder.path(), &[&arguments[..], flags].concat()).status.code()
+    };
+    let image = |name: &str| fs::read(folder.path().join(name)).expect("an image");
+    for (scene, flags, same_as) in
+        [("plain.toml", ["--indirect", "2"], "lit.toml"), ("lit.toml", ["--indirect", "off"], "plain.toml")]
+    {
+        assert_eq!(render(scene, "a.exr", &flags), Some(0));
+        assert_eq!(render(same_as, "b.exr", &[]), Some(0));
+        assert!(image("a.exr") == image("b.exr"), "{scene} with {flags:?} is not {same_as}");
+    }
+    for wrong in ["0", "1001", "on", "-1"] {
+        assert_eq!(render("plain.toml", "a.exr", &[&format!("--indirect={wrong}")]), Some(2), "{wrong}");
+    }
+}
+
 /// A reader that leaves early makes no failure, and doesn't turn a failed check into a success.
 #[cfg(unix)]
 #[test]

@@ -46,16 +46,12 @@ impl LightMeshTable {
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
         shading.resolve = self.resolve.unwrap_or(shading.resolve);
         shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);
-        // The indirect mesh's points and kernel follow from the direct one's unless its table says otherwise.
+        // Indirect light follows from direct light unless its table says otherwise.
         if mesh.indirect.is_some() || self.indirect.is_some() {
-            let form = if shading.lambertian { IndirectForm::Surface } else { IndirectForm::Directional };
-            let indirect = mesh.indirect.get_or_insert_default();
-            indirect.form = self.indirect.as_ref().and_then(|table| table.form).unwrap_or(form);
-            indirect.points = IndirectSettings::coarser_points(&mesh.direct);
-            shading.indirect.kernel = IndirectSettings::wider_kernel(&shading.kernel);
-            if let Some(table) = &self.indirect {
-                table.apply(indirect, &mut shading.indirect, folder, places)?;
-            }
+            settings.derive_indirect();
+        }
+        if let (Some(table), Some(indirect)) = (&self.indirect, &mut settings.mesh.indirect) {
+            table.apply(indirect, &mut settings.shading.indirect, folder, places)?;
         }
         Ok(())
     }
@@ -75,6 +71,7 @@ impl IndirectTable {
         settings.emitter_samples = self.emitter_samples.map_or(settings.emitter_samples, |count| count.0);
         settings.bounces = self.bounces.map_or(settings.bounces, |count| count.0);
         settings.tolerance = self.tolerance.map_or(settings.tolerance, |share| share.0);
+        settings.form = self.form.unwrap_or(settings.form);
         shading.at_surface = self.at_surface.unwrap_or(shading.at_surface);
         shading.normalization = self.normalization.unwrap_or(shading.normalization);
         Ok(())
