@@ -31,6 +31,8 @@ pub struct SurfaceMesh {
     /// By point.
     states: Vec<State>,
     light: FallingLight,
+    /// Points that rays end at.
+    ends: Vec<u32>,
     /// By point: what falls on records from surfaces over π.
     received: Vec<Vec3>,
     /// Records that surface points around each are interpolated from, by point: stretches of `lists`.
@@ -104,6 +106,7 @@ impl SurfaceMesh {
             view: SurfaceView { footprint, height: 1 },
             states: Vec::new(),
             light: FallingLight::default(),
+            ends: Vec::new(),
             received: Vec::new(),
             list_of: Vec::new(),
             lists: Vec::new(),
@@ -220,13 +223,15 @@ impl SurfaceMesh {
         let looked_at: Vec<usize> = sight.records.iter().map(looked_at).collect();
         sight.looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
 
-        let (sources, ends) = self.find_sources(world, &sight, &looked_at, &mut evaluation);
-        self.light.total_up(&self.points, &ends);
+        evaluation.shadow += self.points.link(world, &sight.records);
+        let sources = self.find_sources(world, &sight, &looked_at, &mut evaluation);
+        // Of points that were seen before, too, the source may be new.
+        self.light.total_up(&self.points, &self.ends);
         let IndirectSettings { bounces, tolerance, .. } = self.settings;
-        sources.solve(&self.points, &ends, &mut self.light, bounces.saturating_sub(1), tolerance);
+        sources.solve(&self.points, &self.ends, &mut self.light, bounces.saturating_sub(1), tolerance);
         let mut received = sight.received(&looked_at, &self.light.total);
         if self.correct(&sources, &sight.records, &received) {
-            self.light.total_up(&self.points, &ends);
+            self.light.total_up(&self.points, &self.ends);
             received = sight.received(&looked_at, &self.light.total);
         }
         for (&number, light) in sight.records.iter().zip(received) {
@@ -236,8 +241,7 @@ impl SurfaceMesh {
         evaluation
     }
 
-    /// Lets sources gather that matter for what records see. Returns what they see, and the points that light is sent on from for the first
-    /// time.
+    /// Lets sources gather that matter for what records see. Returns what they see.
     ///
     /// A source matters by how much of its light arrives at the records, over one bounce or several. Those that together matter least
     /// are left out: in a house of many rooms it is most.
@@ -247,14 +251,14 @@ impl SurfaceMesh {
         sight: &Sight,
         looked_at: &[usize],
         evaluation: &mut SurfaceEvaluation,
-    ) -> (Gathered, Vec<u32>) {
+    ) -> Gathered {
         let weight = 1.0 / sight.records.len().max(1) as f32;
         let share = weight / self.settings.directions.max(1) as f32;
         let mut carried: Vec<(u32, f32)> = sight.rays(looked_at).map(|ray| ray.carries(share)).collect();
         let mut new = self.first_seen(&carried);
-        let (mut ends, mut sources) = (new.clone(), Gathered::default());
+        let mut sources = Gathered::default();
         if self.settings.bounces < 2 {
-            return (sources, ends);
+            return sources;
         }
         let mut importance = HashMap::<u32, f32>::new();
         loop {
@@ -276,10 +280,9 @@ impl SurfaceMesh {
                 carried.extend(rays.iter().map(|ray| ray.carries(amount / count as f32)));
             }
             new = self.first_seen(&carried);
-            ends.extend(&new);
             sources.append(gathered);
         }
-        (sources, ends)
+        sources
     }
 
     /// Takes sources out of those that some importance is known of, all but the least important; `None` if no other is left.
@@ -320,12 +323,14 @@ impl SurfaceMesh {
         !sums.is_empty()
     }
 
-    /// Those of the points that light is sent on from for the first time.
+    /// Those of the points that rays end at for the first time.
     fn first_seen(&mut self, carried: &[(u32, f32)]) -> Vec<u32> {
         let states = &mut self.states;
         let new =
             |&number: &u32| number != NO_POINT && !std::mem::replace(&mut states[number as usize].seen, true);
-        carried.iter().map(|&(number, _)| number).filter(new).collect()
+        let new: Vec<u32> = carried.iter().map(|&(number, _)| number).filter(new).collect();
+        self.ends.extend(&new);
+        new
     }
 
     /// Lets points that may become records look around, which shows how near other surfaces are.
@@ -450,7 +455,7 @@ impl SurfaceMesh {
             + self.states.capacity() * size_of::<State>()
             + (2 * self.light.total.capacity() + self.received.capacity()) * size_of::<Vec3>()
             + self.list_of.capacity() * size_of::<Range<u32>>()
-            + self.lists.capacity() * size_of::<u32>()
+            + (self.lists.capacity() + self.ends.capacity() + self.records.capacity()) * size_of::<u32>()
     }
 }
 

@@ -20,7 +20,7 @@ pub const FINEST: u8 = 3;
 const UNEVEN: f32 = 1.0;
 /// Number of no point.
 pub const NO_POINT: u32 = u32::MAX;
-/// Number of a point that nobody has looked for.
+/// In place of the number of a point that nobody has looked for yet.
 const UNLINKED: u32 = u32::MAX - 1;
 
 /// Points by number.
