@@ -30,9 +30,20 @@ pub struct SurfacePoints {
     /// Numbers of the points of each cell that was surveyed: the first, and how many.
     by_cell: HashMap<u64, (u32, u32), BuildKeyHasher>,
     points: Vec<CellPoint>,
+    /// What a search reads of each, for which memory is waited for more than for anything else.
+    sights: Vec<PointSight>,
     levels: Vec<u8>,
     /// By point: the point of level 0 that stands for it, or a reason why there is none.
     parents: Vec<u32>,
+}
+
+/// What a search reads of a point.
+#[derive(Clone, Copy)]
+struct PointSight {
+    position: Vec3,
+    normal: Vec3,
+    divided: bool,
+    uneven: bool,
 }
 
 /// Cosine between the normals of a surface point and of a point that stands for it, at least.
@@ -45,6 +56,7 @@ impl SurfacePoints {
             cells: Cells::new(width),
             by_cell: HashMap::default(),
             points: Vec::new(),
+            sights: Vec::new(),
             levels: Vec::new(),
             parents: Vec::new(),
         }
@@ -70,7 +82,7 @@ impl SurfacePoints {
     /// Whether lights light what a point stands for so unevenly that smaller cells tell more.
     #[inline(always)]
     pub fn uneven(&self, number: u32) -> bool {
-        self.points[number as usize].uneven
+        self.sights[number as usize].uneven
     }
 
     /// Level of the cell of a point.
@@ -172,6 +184,12 @@ impl SurfacePoints {
     fn add(&mut self, key: u64, level: u8, points: &[CellPoint]) {
         self.by_cell.insert(key, (self.points.len() as u32, points.len() as u32));
         self.points.extend_from_slice(points);
+        self.sights.extend(points.iter().map(|point| PointSight {
+            position: point.surface.position,
+            normal: point.surface.shading_normal,
+            divided: point.divided,
+            uneven: point.uneven,
+        }));
         self.levels.resize(self.points.len(), level);
         self.parents.resize(self.points.len(), UNLINKED);
     }
@@ -242,7 +260,7 @@ impl SurfacePoints {
     ) -> Option<u32> {
         let width = self.cells.width(level);
         let best = self.best(numbers.clone(), width, surface)?;
-        if !self.points[best as usize].divided {
+        if !self.sights[best as usize].divided {
             return Some(best);
         }
         // In the smallest cells any will do.
@@ -299,8 +317,8 @@ impl SurfacePoints {
     /// How badly a point stands for a surface point; `None` if it faces another way.
     #[inline(always)]
     fn score(&self, number: u32, width: f32, surface: &SurfacePoint) -> Option<f32> {
-        let other = &self.points[number as usize].surface;
-        let cosine = other.shading_normal.dot(surface.shading_normal);
+        let other = &self.sights[number as usize];
+        let cosine = other.normal.dot(surface.shading_normal);
         let way = other.position - surface.position;
         let height = way.dot(surface.geometric_normal);
         // Weighs more than any way within the cell if it is more than a layer.
@@ -324,7 +342,7 @@ impl SurfacePoints {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.by_cell.capacity() * size_of::<(u64, (u32, u32))>()
-            + self.points.capacity() * size_of::<CellPoint>()
+            + self.points.capacity() * (size_of::<CellPoint>() + size_of::<PointSight>() + size_of::<u32>())
             + self.levels.capacity()
     }
 }
