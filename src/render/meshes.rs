@@ -115,9 +115,11 @@ impl LightMeshes {
                 let settings = settings.mesh.indirect.as_ref();
                 settings.filter(|indirect| (indirect.form == IndirectForm::Surface) == surface)
             };
+            // Before anything is changed: an error leaves all as it is.
+            let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
             self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
             self.surface =
-                of_form(true).map(|indirect| SurfaceMesh::new(indirect, surface_width(indirect, bounds)));
+                of_form(true).zip(width).map(|(indirect, width)| SurfaceMesh::new(indirect, width));
             self.indirect_identity = identity;
         }
         let indirect = match &mut self.indirect {
@@ -154,10 +156,17 @@ impl LightMeshes {
 /// Cells of a surface mesh along the diagonal of a scene, by default.
 const CELLS_ALONG_DIAGONAL: f32 = 60.0;
 
+/// The same at most: finer ones would find surfaces for hours, and take all memory.
+const MOST_CELLS_ALONG_DIAGONAL: f32 = 2000.0;
+
 /// Width of the cells of a surface mesh.
-fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> f32 {
+fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> Result<f32, MeshError> {
+    let diagonal = bounds.extent().length();
     match settings.points.spacing {
-        Spacing::Auto => bounds.extent().length() / CELLS_ALONG_DIAGONAL,
-        Spacing::Units(spacing) => spacing.max_element(),
+        Spacing::Auto => Ok(diagonal / CELLS_ALONG_DIAGONAL),
+        Spacing::Units(spacing) if spacing.max_element() * MOST_CELLS_ALONG_DIAGONAL < diagonal => {
+            Err(MeshError::TooFine(spacing))
+        }
+        Spacing::Units(spacing) => Ok(spacing.max_element()),
     }
 }

@@ -1,6 +1,6 @@
 //! All settings of a render, in one value.
 
-use super::mesh::{IndirectForm, IndirectSettings, MeshSettings};
+use super::mesh::{IndirectForm, IndirectSettings, MeshSettings, Spacing};
 use super::output::OutputSettings;
 use super::shading::ShadingSettings;
 use super::view::ViewSettings;
@@ -25,6 +25,10 @@ impl Settings {
         let indirect = mesh.indirect.get_or_insert_default();
         indirect.form = if shading.lambertian { IndirectForm::Surface } else { IndirectForm::Directional };
         indirect.points = IndirectSettings::coarser_points(&mesh.direct);
+        if indirect.form == IndirectForm::Surface {
+            // Points on surfaces have nothing to do with a lattice for direct light.
+            indirect.points.spacing = Spacing::Auto;
+        }
         shading.indirect.kernel = IndirectSettings::wider_kernel(&shading.kernel);
         indirect
     }

@@ -239,6 +239,11 @@ fn impossible_views_are_refused() {
     let mut fine = settings();
     fine.mesh.direct.spacing = Spacing::Units(Vec3::splat(1e-9));
     assert!(refused(session.render(&loaded.cameras[0], &fine)).contains("too fine"));
+    let mut fine = settings();
+    let mut indirect = IndirectSettings { form: IndirectForm::Surface, ..IndirectSettings::default() };
+    indirect.points.spacing = Spacing::Units(Vec3::splat(1e-4));
+    fine.mesh.indirect = Some(indirect);
+    assert!(refused(session.render(&loaded.cameras[0], &fine)).contains("too fine"));
     assert!(session.set_intensity(0, Vec3::splat(-1.0)).is_err());
     assert!(session.render(&loaded.cameras[0], &settings()).is_ok(), "the session still works");
 }
