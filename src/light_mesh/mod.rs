@@ -20,15 +20,21 @@
 //! | `store` | which points are known, and in which slot |
 //! | [`lookup`] | the known points of D_y that count |
 //! | [`direct`] | visibility of lights at mesh points, and the estimators |
-//! | [`indirect`] | gathering, bounces, irradiance by normal |
+//! | [`indirect`] | gathering at mesh points, bounces, irradiance by normal |
+//! | [`surface`] | gathering at points on surfaces, bounces |
+//!
+//! `direct_light`, `series` and `packed_colour` are what the last two have in common.
 
 pub mod direct;
+mod direct_light;
 pub mod indirect;
 pub(crate) mod leaks;
 pub mod lookup;
+mod packed_colour;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod points;
+mod series;
 mod slot;
 pub mod surface;
 // For tests and benches only.

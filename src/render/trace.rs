@@ -41,9 +41,15 @@ pub struct TilePaths {
 impl TilePaths {
     /// The surface points in groups that are close together.
     pub fn groups(&self, footprint: &PixelFootprint) -> PixelGroups {
-        let surfaces = self.vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
-        PixelGroups::new(surfaces, self.radiance.len(), footprint)
+        pixel_groups(&self.vertices, self.radiance.len(), footprint)
     }
+}
+
+/// The surface points of a tile of so many pixels in groups that are close together.
+#[inline(always)]
+pub fn pixel_groups(vertices: &[PathVertex], pixels: usize, footprint: &PixelFootprint) -> PixelGroups {
+    let surfaces = vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
+    PixelGroups::new(surfaces, pixels, footprint)
 }
 
 /// A camera ray or reflection under way.

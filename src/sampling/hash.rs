@@ -1,4 +1,6 @@
-//! Hashes of positions.
+//! Hashes of positions, and maps of keys that are hashes.
+
+use std::hash::{BuildHasherDefault, Hasher};
 
 use glam::Vec3;
 
@@ -17,4 +19,27 @@ pub fn mix(mut h: u64) -> u64 {
     h = (h ^ h >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     h = (h ^ h >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
     h ^ h >> 31
+}
+
+/// Takes keys, which are hashes, for what they are.
+#[derive(Default)]
+pub struct KeyHasher(u64);
+
+/// Builds [`KeyHasher`]s.
+pub type BuildKeyHasher = BuildHasherDefault<KeyHasher>;
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = mix(self.0 ^ u64::from(byte));
+        }
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key;
+    }
 }

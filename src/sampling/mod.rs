@@ -5,7 +5,7 @@ mod random;
 mod sequence;
 mod sphere;
 
-pub(crate) use hash::{hash_to_unit_cube, mix};
+pub(crate) use hash::{BuildKeyHasher, hash_to_unit_cube, mix};
 pub use random::SplitMix64;
 pub(crate) use sequence::unit_cube_point;
 pub(crate) use sphere::{SphereStrata, rotation_at};

@@ -8,6 +8,7 @@ use super::patches::{NO_PATCH, PatchCell, PatchCells};
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::leaks::is_inside_by_share;
 use crate::light_mesh::lookup::Lookup;
+use crate::light_mesh::packed_colour::PackedColour;
 use crate::light_mesh::points::Neighbours;
 use crate::light_mesh::store::{NeededPoints, PointMask};
 use crate::sampling::rotation_at;
@@ -32,29 +33,22 @@ pub struct Gathering {
 pub struct GatheredRay {
     /// Number of the patch, or [`NO_PATCH`].
     pub patch: u32,
-    /// Square roots of k_d there, three numbers of 10 bits: there are millions of rays, and dark colours need finer steps.
-    diffuse: u32,
+    diffuse: PackedColour,
 }
 
 impl GatheredRay {
-    /// Steps from 0 to 1.
-    const STEPS: f32 = 1023.0;
     /// A ray that left the scene.
-    const MISS: Self = Self { patch: NO_PATCH, diffuse: 0 };
+    const MISS: Self = Self { patch: NO_PATCH, diffuse: PackedColour::BLACK };
 
     #[inline(always)]
     fn new(patch: u32, diffuse: Vec3) -> Self {
-        let step = |k: f32| ((k.sqrt() * Self::STEPS + 0.5) as u32).min(Self::STEPS as u32);
-        let [r, g, b] = diffuse.to_array().map(step);
-        Self { patch, diffuse: r | g << 10 | b << 20 }
+        Self { patch, diffuse: PackedColour::new(diffuse) }
     }
 
     /// k_d where the ray ended.
     #[inline(always)]
     pub fn diffuse(self) -> Vec3 {
-        let root = |shift: u32| (self.diffuse >> shift & 1023) as f32 * (1.0 / Self::STEPS);
-        let root = Vec3::new(root(0), root(10), root(20));
-        root * root
+        self.diffuse.colour()
     }
 }
 
@@ -229,26 +223,5 @@ impl IndirectMesh {
             })
             .collect();
         PointMask::union(parts.into_iter().flatten())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Colours are kept to a hundredth of themselves down to what is black in any picture; no number of a file breaks them.
-    #[test]
-    fn rays_keep_the_colour_where_they_ended() {
-        for k in [1.0f32, 0.7, 0.2, 0.03, 0.01] {
-            let diffuse = Vec3::new(k, 0.0, 1.0 - k);
-            let kept = GatheredRay::new(7, diffuse);
-            assert_eq!(kept.patch, 7);
-            let error = (kept.diffuse() - diffuse).abs();
-            assert!(error.cmple(0.01 * diffuse + 1e-6).all(), "{:?} for {diffuse}", kept.diffuse());
-        }
-        for odd in [f32::NAN, f32::INFINITY, -1.0, 5.0] {
-            let kept = GatheredRay::new(0, Vec3::splat(odd)).diffuse();
-            assert!(kept.cmpge(Vec3::ZERO).all() && kept.cmple(Vec3::ONE).all());
-        }
     }
 }

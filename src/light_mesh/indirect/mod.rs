@@ -4,14 +4,12 @@
 //! k_d·Ĩ_d from this mesh's previous iteration where there are several bounces. Hits near to each other share both;
 //! points that they need are evaluated the same lazy way, until nothing is missing.
 
-pub(crate) mod direct_light;
 mod evaluate;
 mod gather;
 mod interpolation;
 mod mesh;
 mod octahedral;
 mod patches;
-pub(crate) mod series;
 mod solve;
 mod view;
 

@@ -8,14 +8,13 @@
 //! alone, as ever.
 
 use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::direct_light::DirectLight;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
-use crate::sampling::mix;
+use crate::light_mesh::direct_light::DirectLight;
+use crate::sampling::{BuildKeyHasher, mix};
 use crate::scene::{Ray, Scene, SurfacePoint};
 use crate::world::World;
 
@@ -113,7 +112,7 @@ pub struct PatchCells {
     numbers: Numbers,
 }
 
-type Numbers = HashMap<u64, u32, BuildHasherDefault<KeyHasher>>;
+type Numbers = HashMap<u64, u32, BuildKeyHasher>;
 
 impl PatchCells {
     /// The number of a cell, which is added if it is new.
@@ -211,26 +210,6 @@ impl Patches {
             + self.cells.numbers.capacity() * size_of::<(u64, u32)>()
             + self.surfaces.capacity() * size_of::<Option<SurfacePoint>>()
             + self.direct.capacity() * size_of::<Vec3>()
-    }
-}
-
-/// Takes keys, which are hashes, for what they are.
-#[derive(Default)]
-struct KeyHasher(u64);
-
-impl Hasher for KeyHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.0 = mix(self.0 ^ u64::from(byte));
-        }
-    }
-
-    fn write_u64(&mut self, key: u64) {
-        self.0 = key;
     }
 }
 

@@ -1,7 +1,5 @@
 //! Cells of space, and the surfaces in them: where the points of a surface mesh lie.
 
-use std::hash::{BuildHasherDefault, Hasher};
-
 use glam::Vec3;
 
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
@@ -229,13 +227,12 @@ pub fn survey<A: Accel>(accel: &A, scene: &Scene, cells: &Cells, cell: Cell) -> 
 fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut Vec<CellPoint>) -> u64 {
     let mut groups: Vec<Vec<SurfacePoint>> = Vec::new();
     let (mut left, mut rays) = (surface, 0);
-    let mut members_of = Vec::new();
     while !left.is_empty() && groups.len() < MOST_DIVISIONS {
         let middle = left.iter().map(|point| point.position).sum::<Vec3>() / left.len() as f32;
         let distance = |point: &SurfacePoint| point.position.distance_squared(middle);
         let best = (0..left.len()).min_by(|&a, &b| distance(&left[a]).total_cmp(&distance(&left[b])));
-        // The point that stands for the group comes first.
         let best = left[best.unwrap_or_default()];
+        // The point that stands for the group comes first, and once more among its members.
         let mut group = vec![best];
         let mut hidden = Vec::new();
         for points in left.chunks(LINES) {
@@ -252,7 +249,6 @@ fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut
                 if blocked >> lane & 1 == 1 { hidden.push(*point) } else { group.push(*point) }
             }
         }
-        members_of.push(group[1..].iter().map(|point| point.position).collect::<Vec<Vec3>>());
         groups.push(group);
         if (hidden.len() as u32) * HIDDEN_OF < left.len() as u32 {
             break;
@@ -261,7 +257,7 @@ fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut
     }
     for (number, group) in groups.iter().enumerate() {
         let others = groups.iter().enumerate().filter(|(other, _)| *other != number);
-        let (point, members) = (group[0], &members_of[number]);
+        let (point, members) = (group[0], &group[1..]);
         let divided = others.into_iter().any(|(_, other)| {
             let near = |point: &SurfacePoint, other: &SurfacePoint| {
                 (other.position - point.position).dot(point.shading_normal).abs() < LAYER * width
@@ -269,33 +265,10 @@ fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut
             other.iter().any(|other| near(&point, other)) || group.iter().any(|point| near(&other[0], point))
         });
         // Lines run row by row: steps of a quarter and one spread over rows and columns.
-        let spread = [0, 1, 2, 3].map(|k| members[k * (members.len() + 4) / 4 % members.len()]);
+        let spread = [0, 1, 2, 3].map(|k| members[k * (members.len() + 4) / 4 % members.len()].position);
         out.push(CellPoint { spread, divided, ..CellPoint::alone(&point) });
     }
     rays
-}
-
-/// Hasher of keys that are hashes already.
-#[derive(Default)]
-pub struct KeyHasher(u64);
-
-/// Builds [`KeyHasher`]s.
-pub type BuildKeyHasher = BuildHasherDefault<KeyHasher>;
-
-impl Hasher for KeyHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.0 = mix(self.0 ^ u64::from(byte));
-        }
-    }
-
-    fn write_u64(&mut self, key: u64) {
-        self.0 = key;
-    }
 }
 
 #[cfg(test)]

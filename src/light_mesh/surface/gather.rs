@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::directions::HemisphereDirections;
 use super::points::{FINEST, LastPlace, NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::light_mesh::packed_colour::PackedColour;
 use crate::sampling::hash_to_unit_cube;
 use crate::scene::{Ray, SurfacePoint};
 use crate::simd::vectorize;
@@ -31,7 +32,7 @@ pub struct GatheredRay {
 }
 
 impl GatheredRay {
-    const NOTHING: Self = Self { point: NO_POINT, diffuse: PackedColour(0) };
+    const NOTHING: Self = Self { point: NO_POINT, diffuse: PackedColour::BLACK };
 
     /// The point that stands for where it ended, and how much of the light there it brings along, times a weight.
     pub fn carries(self, weight: f32) -> (u32, f32) {
@@ -42,29 +43,6 @@ impl GatheredRay {
     #[inline(always)]
     pub fn diffuse(self) -> Vec3 {
         self.diffuse.colour()
-    }
-}
-
-/// Square roots of a colour, three numbers of 10 bits: there are millions of rays, and dark colours need finer steps.
-#[derive(Clone, Copy, Debug)]
-struct PackedColour(u32);
-
-impl PackedColour {
-    /// Steps from 0 to 1.
-    const STEPS: f32 = 1023.0;
-
-    #[inline(always)]
-    fn new(colour: Vec3) -> Self {
-        let step = |k: f32| ((k.sqrt() * Self::STEPS + 0.5) as u32).min(Self::STEPS as u32);
-        let [r, g, b] = colour.to_array().map(step);
-        Self(r | g << 10 | b << 20)
-    }
-
-    #[inline(always)]
-    fn colour(self) -> Vec3 {
-        let root = |shift: u32| (self.0 >> shift & 1023) as f32 * (1.0 / Self::STEPS);
-        let root = Vec3::new(root(0), root(10), root(20));
-        root * root
     }
 }
 
@@ -318,24 +296,5 @@ impl<A: Accel> NullaryFnOnce for GatherTask<'_, A> {
             part.closeness.push(closeness);
         }
         part
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Colours are kept to a hundredth of themselves down to what is black in any picture; no number of a file breaks them.
-    #[test]
-    fn rays_keep_the_colour_where_they_ended() {
-        for k in [1.0f32, 0.7, 0.2, 0.03, 0.01] {
-            let diffuse = Vec3::new(k, 0.0, 1.0 - k);
-            let error = (PackedColour::new(diffuse).colour() - diffuse).abs();
-            assert!(error.cmple(0.01 * diffuse + 1e-6).all(), "{error} for {diffuse}");
-        }
-        for odd in [f32::NAN, f32::INFINITY, -1.0, 5.0] {
-            let kept = PackedColour::new(Vec3::splat(odd)).colour();
-            assert!(kept.cmpge(Vec3::ZERO).all() && kept.cmple(Vec3::ONE).all());
-        }
     }
 }

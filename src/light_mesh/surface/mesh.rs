@@ -1,17 +1,18 @@
 //! The surface mesh: its points, and the light that is known at them.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::directions::{HemisphereDirections, half, quarter};
-use super::gather::{Gather, Gathered, GatheredRay};
+use super::directions::{HemisphereDirections, quarter};
+use super::gather::{Gather, Gathered};
 use super::interpolate::{interpolate, neighbours};
 use super::pixels::PixelGroups;
-use super::points::{FINEST, LastPlace, NO_POINT, SurfacePoints};
+use super::points::{FINEST, LastPlace, SurfacePoints};
 use super::solve::FallingLight;
+use super::sources::RecordRays;
 use crate::accel::Accel;
 use crate::scene::{PixelFootprint, SurfacePoint};
 use crate::settings::IndirectSettings;
@@ -23,16 +24,16 @@ use crate::world::World;
 /// cells should take their place. What the rays hit is lit by lights at points of cells that are smaller where that light is uneven; light
 /// from surfaces is less so, and comes from points of level 0, sources, which gather it with half of the directions.
 pub struct SurfaceMesh {
-    settings: IndirectSettings,
-    points: SurfacePoints,
+    pub(super) settings: IndirectSettings,
+    pub(super) points: SurfacePoints,
     directions: HemisphereDirections,
     /// The view that is rendered.
     view: SurfaceView,
     /// By point.
-    states: Vec<State>,
-    light: FallingLight,
+    pub(super) states: Vec<State>,
+    pub(super) light: FallingLight,
     /// Points that rays end at.
-    ends: Vec<u32>,
+    pub(super) ends: Vec<u32>,
     /// By point: what falls on records from surfaces over π.
     received: Vec<Vec3>,
     /// Records that surface points around each are interpolated from, by point: stretches of `lists`.
@@ -55,16 +56,16 @@ pub struct SurfaceView {
 
 /// What is known of a point.
 #[derive(Clone, Copy, Debug, Default)]
-struct State {
+pub(super) struct State {
     /// Where what it sees is among the looked at, plus one.
     looked_at: u32,
     /// Harmonic mean distance of the surfaces that it sees, 0 if it has not been looked at.
     distance: f32,
     /// Whether light from surfaces is known: as a record, as a source.
     received: bool,
-    solved: bool,
+    pub(super) solved: bool,
     /// Whether rays end at it.
-    seen: bool,
+    pub(super) seen: bool,
     /// Whether it is a record of the view.
     listed: bool,
 }
@@ -79,8 +80,6 @@ const MOST_PIXELS: f32 = 8.0;
 const MOST_OF_HEIGHT: f32 = 1.0 / 32.0;
 /// Width of cells, per distance along a ray, that tell uneven light of lights apart.
 const FINENESS: f32 = 0.15;
-/// Part of the light of records that sources may leave out that send little of it.
-const LEFT_OUT: f32 = 5e-4;
 
 /// What the evaluation of a surface mesh took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -218,7 +217,7 @@ impl SurfaceMesh {
         let count = self.settings.directions;
         self.look(world, new.clone(), &mut evaluation);
         let rest = self.gather(world, quarter(count)..count, FINENESS, new.clone(), &mut evaluation);
-        let sight = Sight { looked: std::mem::take(&mut self.looked), rest, records: new, count };
+        let sight = RecordRays { looked: std::mem::take(&mut self.looked), rest, records: new, count };
         let looked_at = |number: &u32| self.states[*number as usize].looked_at as usize - 1;
         let looked_at: Vec<usize> = sight.records.iter().map(looked_at).collect();
         sight.looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
@@ -241,98 +240,6 @@ impl SurfaceMesh {
         evaluation
     }
 
-    /// Lets sources gather that matter for what records see. Returns what they see.
-    ///
-    /// A source matters by how much of its light arrives at the records, over one bounce or several. Those that together matter least
-    /// are left out: in a house of many rooms it is most.
-    fn find_sources<A: Accel>(
-        &mut self,
-        world: World<A>,
-        sight: &Sight,
-        looked_at: &[usize],
-        evaluation: &mut SurfaceEvaluation,
-    ) -> Gathered {
-        let weight = 1.0 / sight.records.len().max(1) as f32;
-        let share = weight / self.settings.directions.max(1) as f32;
-        let mut carried: Vec<(u32, f32)> = sight.rays(looked_at).map(|ray| ray.carries(share)).collect();
-        let mut new = self.first_seen(&carried);
-        let mut sources = Gathered::default();
-        if self.settings.bounces < 2 {
-            return sources;
-        }
-        let mut importance = HashMap::<u32, f32>::new();
-        loop {
-            evaluation.shadow += self.points.link(world, &new);
-            self.extend();
-            for (number, amount) in carried.drain(..).filter(|(number, _)| *number != NO_POINT) {
-                let parent = self.points.parent(number);
-                if parent != NO_POINT && !self.states[parent as usize].solved {
-                    *importance.entry(parent).or_default() += amount;
-                }
-            }
-            let Some(chosen) = self.choose(&mut importance) else { break };
-            let numbers = chosen.iter().map(|&(number, _)| number).collect();
-            let count = half(self.settings.directions);
-            // Light of lights matters less after two bounces: wide cells will do.
-            let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
-            evaluation.evaluated += gathered.points.len() as u64;
-            for (rays, (_, amount)) in gathered.rays.chunks(count as usize).zip(&chosen) {
-                carried.extend(rays.iter().map(|ray| ray.carries(amount / count as f32)));
-            }
-            new = self.first_seen(&carried);
-            sources.append(gathered);
-        }
-        sources
-    }
-
-    /// Takes sources out of those that some importance is known of, all but the least important; `None` if no other is left.
-    fn choose(&mut self, importance: &mut HashMap<u32, f32>) -> Option<Vec<(u32, f32)>> {
-        let mut sources: Vec<(u32, f32)> =
-            importance.iter().map(|(&number, &amount)| (number, amount)).collect();
-        let points = &self.points;
-        sources.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| points.key(a.0).cmp(&points.key(b.0))));
-        let mut left_out = 0.0;
-        let first = sources.iter().position(|(_, amount)| {
-            left_out += amount;
-            left_out > LEFT_OUT
-        })?;
-        let mut chosen = sources.split_off(first);
-        chosen.sort_by_cached_key(|&(number, _)| points.key(number));
-        for (number, _) in &chosen {
-            importance.remove(number);
-            self.states[*number as usize].solved = true;
-        }
-        Some(chosen)
-    }
-
-    /// Puts what records receive in place of what new sources around them do, for they know better; returns whether there were any.
-    fn correct(&mut self, sources: &Gathered, records: &[u32], received: &[Vec3]) -> bool {
-        let new: HashSet<u32> = sources.points.iter().copied().collect();
-        let mut sums = HashMap::<u32, (Vec3, f32)>::new();
-        for (&number, light) in records.iter().zip(received) {
-            let parent = self.points.parent(number);
-            if new.contains(&parent) {
-                let (sum, count) = sums.entry(parent).or_default();
-                *sum += *light;
-                *count += 1.0;
-            }
-        }
-        for (&parent, (sum, count)) in &sums {
-            self.light.indirect[parent as usize] = sum / count;
-        }
-        !sums.is_empty()
-    }
-
-    /// Those of the points that rays end at for the first time.
-    fn first_seen(&mut self, carried: &[(u32, f32)]) -> Vec<u32> {
-        let states = &mut self.states;
-        let new =
-            |&number: &u32| number != NO_POINT && !std::mem::replace(&mut states[number as usize].seen, true);
-        let new: Vec<u32> = carried.iter().map(|&(number, _)| number).filter(new).collect();
-        self.ends.extend(&new);
-        new
-    }
-
     /// Lets points that may become records look around, which shows how near other surfaces are.
     fn look<A: Accel>(&mut self, world: World<A>, mut numbers: Vec<u32>, evaluation: &mut SurfaceEvaluation) {
         numbers.retain(|&number| self.states[number as usize].looked_at == 0);
@@ -346,7 +253,8 @@ impl SurfaceMesh {
         self.looked.append(gathered);
     }
 
-    fn gather<A: Accel>(
+    /// Traces the rays of some points in a range of the directions.
+    pub(super) fn gather<A: Accel>(
         &mut self,
         world: World<A>,
         range: Range<u32>,
@@ -392,7 +300,7 @@ impl SurfaceMesh {
     }
 
     /// Makes room for points that were added.
-    fn extend(&mut self) {
+    pub(super) fn extend(&mut self) {
         let count = self.points.len();
         self.states.resize(count, State::default());
         self.light.resize(count);
@@ -456,33 +364,6 @@ impl SurfaceMesh {
             + (2 * self.light.total.capacity() + self.received.capacity()) * size_of::<Vec3>()
             + self.list_of.capacity() * size_of::<Range<u32>>()
             + (self.lists.capacity() + self.ends.capacity() + self.records.capacity()) * size_of::<u32>()
-    }
-}
-
-/// What records see: with the quarter of the directions with which they were looked at, and with the rest.
-struct Sight {
-    looked: Gathered,
-    rest: Gathered,
-    records: Vec<u32>,
-    /// Directions.
-    count: u32,
-}
-
-impl Sight {
-    /// All rays, record by record, given where each is among the looked at.
-    fn rays<'a>(&'a self, looked_at: &'a [usize]) -> impl Iterator<Item = GatheredRay> + 'a {
-        looked_at.iter().enumerate().flat_map(|(index, &looked_at)| {
-            self.looked.rays_of(looked_at).iter().chain(self.rest.rays_of(index)).copied()
-        })
-    }
-
-    /// What each record receives, given what falls on each point.
-    fn received(&self, looked_at: &[usize], total: &[Vec3]) -> Vec<Vec3> {
-        let share = 1.0 / self.count.max(1) as f32;
-        let of = |(index, &looked_at): (usize, &usize)| {
-            (self.looked.sum(looked_at, total) + self.rest.sum(index, total)) * share
-        };
-        looked_at.par_iter().enumerate().with_min_len(64).map(of).collect()
     }
 }
 

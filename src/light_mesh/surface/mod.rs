@@ -8,6 +8,7 @@ mod mesh;
 mod pixels;
 mod points;
 mod solve;
+mod sources;
 
 pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
 pub use pixels::PixelGroups;

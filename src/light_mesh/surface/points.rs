@@ -6,10 +6,10 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::cells::{BuildKeyHasher, Cell, CellPoint, Cells, line_between, survey};
+use super::cells::{Cell, CellPoint, Cells, line_between, survey};
 use crate::accel::Accel;
-use crate::light_mesh::indirect::direct_light::DirectLight;
-use crate::sampling::mix;
+use crate::light_mesh::direct_light::DirectLight;
+use crate::sampling::{BuildKeyHasher, mix};
 use crate::scene::SurfacePoint;
 use crate::world::World;
 

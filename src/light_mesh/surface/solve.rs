@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::gather::Gathered;
 use super::points::SurfacePoints;
-use crate::light_mesh::indirect::series::Series;
+use crate::light_mesh::series::Series;
 
 /// Light that falls on points, by number.
 #[derive(Default)]

@@ -6,13 +6,12 @@ use pulp::NullaryFnOnce;
 use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
 use crate::light_mesh::lookup::LookupScratch;
-use crate::light_mesh::surface::PixelGroups;
 use crate::render::frame::BlockIntegrator;
 use crate::render::meshes::{LightMeshes, MeshInterpolation};
 use crate::render::need::needed_points;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
-use crate::render::trace::{PathVertex, TilePaths};
+use crate::render::trace::{PathVertex, TilePaths, pixel_groups};
 use crate::simd::vectorize;
 use crate::world::World;
 
@@ -76,8 +75,7 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
             counters.indirect_fallbacks = scratch.fallbacks;
         }
         if let Some(mesh) = &meshes.surface {
-            let surfaces = vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
-            let groups = PixelGroups::new(surfaces, tile.pixels(), &mesh.view().footprint);
+            let groups = pixel_groups(vertices, tile.pixels(), &mesh.view().footprint);
             counters.shadow_rays += mesh.illuminate(accel, &groups, interpolation.surface_scale, light);
         }
         counters

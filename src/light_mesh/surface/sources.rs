@@ -1,0 +1,140 @@
+//! Sources: the points of level 0 that send light on to records, and which of them matter.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::directions::half;
+use super::gather::{Gathered, GatheredRay};
+use super::mesh::{SurfaceEvaluation, SurfaceMesh};
+use super::points::NO_POINT;
+use crate::accel::Accel;
+use crate::world::World;
+
+/// Part of the light of records that sources may leave out that send little of it.
+const LEFT_OUT: f32 = 5e-4;
+
+/// What records see: with the quarter of the directions with which they were looked at, and with the rest.
+pub struct RecordRays {
+    /// With the quarter.
+    pub looked: Gathered,
+    /// With the rest.
+    pub rest: Gathered,
+    /// The records, by number.
+    pub records: Vec<u32>,
+    /// Directions.
+    pub count: u32,
+}
+
+impl RecordRays {
+    /// All rays, record by record, given where each is among the looked at.
+    fn rays<'a>(&'a self, looked_at: &'a [usize]) -> impl Iterator<Item = GatheredRay> + 'a {
+        looked_at.iter().enumerate().flat_map(|(index, &looked_at)| {
+            self.looked.rays_of(looked_at).iter().chain(self.rest.rays_of(index)).copied()
+        })
+    }
+
+    /// What each record receives, given what falls on each point.
+    pub fn received(&self, looked_at: &[usize], total: &[Vec3]) -> Vec<Vec3> {
+        let share = 1.0 / self.count.max(1) as f32;
+        let of = |(index, &looked_at): (usize, &usize)| {
+            (self.looked.sum(looked_at, total) + self.rest.sum(index, total)) * share
+        };
+        looked_at.par_iter().enumerate().with_min_len(64).map(of).collect()
+    }
+}
+
+impl SurfaceMesh {
+    /// Lets sources gather that matter for what records see. Returns what they see.
+    ///
+    /// A source matters by how much of its light arrives at the records, over one bounce or several. Those that together matter least
+    /// are left out: in a house of many rooms it is most.
+    pub(super) fn find_sources<A: Accel>(
+        &mut self,
+        world: World<A>,
+        sight: &RecordRays,
+        looked_at: &[usize],
+        evaluation: &mut SurfaceEvaluation,
+    ) -> Gathered {
+        let weight = 1.0 / sight.records.len().max(1) as f32;
+        let share = weight / self.settings.directions.max(1) as f32;
+        let mut carried: Vec<(u32, f32)> = sight.rays(looked_at).map(|ray| ray.carries(share)).collect();
+        let mut new = self.first_seen(&carried);
+        let mut sources = Gathered::default();
+        if self.settings.bounces < 2 {
+            return sources;
+        }
+        let mut importance = HashMap::<u32, f32>::new();
+        loop {
+            evaluation.shadow += self.points.link(world, &new);
+            self.extend();
+            for (number, amount) in carried.drain(..).filter(|(number, _)| *number != NO_POINT) {
+                let parent = self.points.parent(number);
+                if parent != NO_POINT && !self.states[parent as usize].solved {
+                    *importance.entry(parent).or_default() += amount;
+                }
+            }
+            let Some(chosen) = self.choose(&mut importance) else { break };
+            let numbers = chosen.iter().map(|&(number, _)| number).collect();
+            let count = half(self.settings.directions);
+            // Light of lights matters less after two bounces: wide cells will do.
+            let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
+            evaluation.evaluated += gathered.points.len() as u64;
+            for (rays, (_, amount)) in gathered.rays.chunks(count as usize).zip(&chosen) {
+                carried.extend(rays.iter().map(|ray| ray.carries(amount / count as f32)));
+            }
+            new = self.first_seen(&carried);
+            sources.append(gathered);
+        }
+        sources
+    }
+
+    /// Takes sources out of those that some importance is known of, all but the least important; `None` if no other is left.
+    fn choose(&mut self, importance: &mut HashMap<u32, f32>) -> Option<Vec<(u32, f32)>> {
+        let mut sources: Vec<(u32, f32)> =
+            importance.iter().map(|(&number, &amount)| (number, amount)).collect();
+        let points = &self.points;
+        sources.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| points.key(a.0).cmp(&points.key(b.0))));
+        let mut left_out = 0.0;
+        let first = sources.iter().position(|(_, amount)| {
+            left_out += amount;
+            left_out > LEFT_OUT
+        })?;
+        let mut chosen = sources.split_off(first);
+        chosen.sort_by_cached_key(|&(number, _)| points.key(number));
+        for (number, _) in &chosen {
+            importance.remove(number);
+            self.states[*number as usize].solved = true;
+        }
+        Some(chosen)
+    }
+
+    /// Puts what records receive in place of what new sources around them do, for they know better; returns whether there were any.
+    pub(super) fn correct(&mut self, sources: &Gathered, records: &[u32], received: &[Vec3]) -> bool {
+        let new: HashSet<u32> = sources.points.iter().copied().collect();
+        let mut sums = HashMap::<u32, (Vec3, f32)>::new();
+        for (&number, light) in records.iter().zip(received) {
+            let parent = self.points.parent(number);
+            if new.contains(&parent) {
+                let (sum, count) = sums.entry(parent).or_default();
+                *sum += *light;
+                *count += 1.0;
+            }
+        }
+        for (&parent, (sum, count)) in &sums {
+            self.light.indirect[parent as usize] = sum / count;
+        }
+        !sums.is_empty()
+    }
+
+    /// Those of the points that rays end at for the first time.
+    fn first_seen(&mut self, carried: &[(u32, f32)]) -> Vec<u32> {
+        let states = &mut self.states;
+        let new =
+            |&number: &u32| number != NO_POINT && !std::mem::replace(&mut states[number as usize].seen, true);
+        let new: Vec<u32> = carried.iter().map(|&(number, _)| number).filter(new).collect();
+        self.ends.extend(&new);
+        new
+    }
+}
