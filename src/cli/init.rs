@@ -129,7 +129,10 @@ fn scene_file(
     }
     line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
     line(format!("resolve = \"{}\"", Resolve::Trace));
-    line("\n# Light from surfaces, bounce after bounce: remove the # to have it.\n# [light_mesh.indirect]\n# bounces = 4".to_owned());
+    if let Some(indirect) = &loaded.settings.mesh.indirect {
+        line("\n# Light from surfaces, bounce after bounce; without this table there is none.".to_owned());
+        line(format!("[light_mesh.indirect]\nbounces = {}", indirect.bounces));
+    }
     line("\n[[geometry]]".to_owned());
     line(format!("file = {}", quoted(file)));
     if has_lights {

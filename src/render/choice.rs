@@ -22,7 +22,7 @@ use super::trace::{PathVertex, TilePaths};
 use crate::accel::Accel;
 use crate::lights::PackedLights;
 use crate::scene::Camera;
-use crate::settings::{Estimator, Integrator, Resolve, Settings};
+use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
 use crate::simd::LANES;
 
 /// What `auto` took, and why.
@@ -38,7 +38,7 @@ pub struct Choice {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
-    /// The settings ask for what only a light mesh gives: soft shadows, or indirect light.
+    /// The settings ask for what only a light mesh gives: soft shadows, or indirect light at points in free space.
     Settings,
     /// So many lights lie above the horizon of a surface point that the one way is known to be cheaper.
     Lights(f32),
@@ -52,7 +52,7 @@ impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{}: ", self.integrator)?;
         match self.reason {
-            Reason::Settings => f.write_str("soft shadows or indirect light"),
+            Reason::Settings => f.write_str("soft shadows, or indirect light in free space"),
             Reason::Lights(lights) => write!(f, "{lights:.1} lights above the horizon of a surface point"),
             Reason::Trial(share) => {
                 write!(f, "a light mesh is estimated at {:.0} % of conventional shading", 100.0 * share)
@@ -98,7 +98,9 @@ pub(super) fn choose<A: Accel>(
 ) -> Result<Choice, RenderError> {
     let shading = &settings.shading;
     let traced = shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight;
-    if !traced || settings.mesh.indirect.is_some() {
+    // Light from points on surfaces goes with either.
+    let in_space = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
+    if !traced || settings.mesh.indirect.as_ref().is_some_and(in_space) {
         return Ok(Choice { integrator: Integrator::LightMesh, reason: Reason::Settings });
     }
     let by_lights = |integrator, lights| Ok(Choice { integrator, reason: Reason::Lights(lights) });
@@ -128,7 +130,12 @@ pub(super) fn choose<A: Accel>(
             * tiles.iter().map(Tile::pixels).sum::<usize>() as f32
             / points.max(1) as f32
     };
-    let mut integrator = LightMeshIntegrator { world, meshes, interpolation: &interpolation };
+    let mut integrator = LightMeshIntegrator {
+        world,
+        direct: &mut meshes.direct,
+        indirect: None,
+        interpolation: &interpolation,
+    };
     integrator.evaluate(&paths, stats);
     let mut shade = stats.seconds.shade;
     let tried: Vec<ShadeCounters> = timed(&mut shade, || {

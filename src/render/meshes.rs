@@ -1,7 +1,5 @@
 //! The light meshes of a scene, and how one render interpolates them.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 
 use crate::Bounds;
@@ -11,8 +9,8 @@ use crate::light_mesh::points::{AutoSpacing, MeshError};
 use crate::light_mesh::surface::SurfaceMesh;
 use crate::scene::{Camera, Scene};
 use crate::settings::{
-    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, Normalization, PointSettings,
-    Resolve, Settings, Spacing,
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
+    Settings, Spacing,
 };
 
 /// Light meshes of a scene; they keep their values from one render to the next, whatever settings follow.
@@ -63,8 +61,6 @@ impl IndirectIdentity {
 pub struct MeshInterpolation {
     pub(super) direct: DirectInterpolation,
     pub(super) indirect: Option<IndirectInterpolation>,
-    /// What light at surfaces is multiplied by.
-    pub(super) surface_scale: f32,
     /// What I(y) is multiplied by before k_d.
     pub(super) direct_scale: f32,
     /// Whether lights on which mesh points disagree are traced.
@@ -84,6 +80,29 @@ impl LightMeshes {
     /// Meshes over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
         Self { direct: DirectMesh::new(bounds), indirect: None, surface: None, indirect_identity: None }
+    }
+
+    /// Makes the meshes of indirect light those that the settings ask for: values stay, but for those that other settings would have
+    /// made.
+    ///
+    /// # Errors
+    /// [`MeshError::TooFine`]; then nothing has changed.
+    pub(super) fn renew_indirect(&mut self, scene: &Scene, settings: &Settings) -> Result<(), MeshError> {
+        let identity = IndirectIdentity::of(settings, scene);
+        if self.indirect_identity != identity {
+            let bounds = self.direct.store().points.bounds();
+            let of_form = |surface| {
+                let settings = settings.mesh.indirect.as_ref();
+                settings.filter(|indirect| (indirect.form == IndirectForm::Surface) == surface)
+            };
+            // Before anything is changed: an error leaves all as it is.
+            let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
+            self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
+            self.surface =
+                of_form(true).zip(width).map(|(indirect, width)| SurfaceMesh::new(indirect, width));
+            self.indirect_identity = identity;
+        }
+        Ok(())
     }
 
     /// Makes the meshes ready to be interpolated by these settings. Values stay, but for those of an indirect mesh that other settings
@@ -108,20 +127,7 @@ impl LightMeshes {
         };
         let direct =
             self.direct.interpolation(&settings.mesh.direct, &shading.kernel, shading.estimator, auto)?;
-        let identity = IndirectIdentity::of(settings, scene);
-        if self.indirect_identity != identity {
-            let bounds = self.direct.store().points.bounds();
-            let of_form = |surface| {
-                let settings = settings.mesh.indirect.as_ref();
-                settings.filter(|indirect| (indirect.form == IndirectForm::Surface) == surface)
-            };
-            // Before anything is changed: an error leaves all as it is.
-            let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
-            self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
-            self.surface =
-                of_form(true).zip(width).map(|(indirect, width)| SurfaceMesh::new(indirect, width));
-            self.indirect_identity = identity;
-        }
+        self.renew_indirect(scene, settings)?;
         let indirect = match &mut self.indirect {
             Some(mesh) => Some(mesh.interpolation(&shading.indirect)?),
             None => None,
@@ -129,10 +135,6 @@ impl LightMeshes {
         Ok(MeshInterpolation {
             direct,
             indirect,
-            surface_scale: match shading.indirect.normalization {
-                Normalization::Mean => 1.0,
-                Normalization::Integral => 4.0 * PI,
-            },
             direct_scale: shading.direct_scale(),
             hybrid,
             tolerance: shading.tolerance,

@@ -14,6 +14,7 @@ mod need;
 mod session;
 mod stats;
 mod surface_group;
+mod surface_light;
 mod tiles;
 mod trace;
 

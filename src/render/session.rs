@@ -1,21 +1,20 @@
 //! A scene that is rendered more than once: everything that outlives a view.
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::choice::choose;
 use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::frame::{Frame, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
-use super::meshes::LightMeshes;
+use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::stats::{RenderStats, timed};
+use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
 use crate::accel::{Accel, Backend, BackendChoice, with_accel};
 use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectField};
 use crate::light_mesh::store::PointMask;
-use crate::light_mesh::surface::{PixelGroups, SurfaceView};
 use crate::lights::{EmissiveTriangles, PackedLights};
 use crate::scene::{Camera, Scene, SceneError};
 use crate::settings::{Integrator, Settings};
@@ -183,68 +182,66 @@ fn render_frame<A: Accel>(
         named => named,
     };
     stats.integrator = Some(integrator);
-    let image = match integrator {
-        Integrator::Conventional => {
-            let scale = settings.shading.direct_scale();
-            frame.run(&mut ConventionalIntegrator { world, scale }, &mut stats)?
+    let by_light_mesh = matches!(integrator, Integrator::LightMesh | Integrator::Auto);
+    let interpolation = if by_light_mesh {
+        let interpolation = meshes.interpolation(world.scene, camera, settings)?;
+        evaluate_indirect(&mut frame, meshes, &interpolation, &mut stats)?;
+        Some(interpolation)
+    } else {
+        meshes.renew_indirect(world.scene, settings)?;
+        None
+    };
+    if let Some(mesh) = &mut meshes.surface {
+        evaluate_surface_light(&mut frame, mesh, camera, settings, &mut stats)?;
+    }
+    let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
+    let image = match (integrator, interpolation) {
+        (Integrator::Reference, _) => {
+            let direct = ReferenceIntegrator::new(world, settings)?;
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
         }
-        Integrator::Reference => frame.run(&mut ReferenceIntegrator::new(world, settings)?, &mut stats)?,
-        Integrator::LightMesh | Integrator::Auto => {
-            let interpolation = meshes.interpolation(world.scene, camera, settings)?;
-            let counters = &mut stats.mesh_points;
-            counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);
-            if let (Some(mesh), Some(view)) = (&mut meshes.indirect, &interpolation.indirect) {
-                counters.indirect.total = view.neighbourhoods.count(&mesh.store().points);
-                // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
-                let mut needed = Vec::new();
-                frame.trace_image(&mut stats, |paths, stats| {
-                    timed(&mut stats.seconds.mesh, || {
-                        needed.extend(needed_points(paths, mesh.view(view).lookup).bricks());
-                    });
-                })?;
-                let mut seconds = stats.seconds.mesh;
-                timed(&mut seconds, || {
-                    let needed = PointMask::union(needed);
-                    stats.mesh_points.indirect.needed += needed.len();
-                    let transport = interpolation.transport();
-                    stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
-                });
-                stats.seconds.mesh = seconds;
-            }
-            if let Some(mesh) = &mut meshes.surface {
-                let resolution = settings.view.resolution;
-                mesh.turn_to(SurfaceView {
-                    footprint: camera.pixel_footprint(resolution),
-                    height: resolution.1,
-                });
-                frame.trace_image(&mut stats, |paths, stats| {
-                    let mut seconds = stats.seconds.mesh;
-                    timed(&mut seconds, || {
-                        let groups: Vec<PixelGroups> =
-                            paths.par_iter().map(|paths| paths.groups(&mesh.view().footprint)).collect();
-                        let evaluation = mesh.need(
-                            world,
-                            groups
-                                .iter()
-                                .map(|groups| groups.groups.iter().map(|group| &group.first).collect())
-                                .collect(),
-                        );
-                        stats.add_surface(evaluation);
-                    });
-                    stats.seconds.mesh = seconds;
-                })?;
-                let mut seconds = stats.seconds.mesh;
-                timed(&mut seconds, || {
-                    let evaluation = mesh.evaluate(world, interpolation.direct_scale);
-                    stats.add_surface(evaluation);
-                });
-                stats.seconds.mesh = seconds;
-            }
-            let image = frame
-                .run(&mut LightMeshIntegrator { world, meshes, interpolation: &interpolation }, &mut stats)?;
-            stats.light_mesh_bytes = meshes.memory_bytes() as u64;
-            image
+        (_, Some(interpolation)) => {
+            let (direct, indirect) = (&mut meshes.direct, meshes.indirect.as_ref());
+            let direct = LightMeshIntegrator { world, direct, indirect, interpolation: &interpolation };
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
+        }
+        (_, None) => {
+            let direct = ConventionalIntegrator { world, scale: settings.shading.direct_scale() };
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
         }
     };
+    if by_light_mesh || meshes.surface.is_some() {
+        stats.light_mesh_bytes = meshes.memory_bytes() as u64;
+    }
     Ok((image, stats))
+}
+
+/// Evaluates what the view of a frame needs of a mesh of indirect light in free space.
+fn evaluate_indirect<A: Accel>(
+    frame: &mut Frame<A>,
+    meshes: &mut LightMeshes,
+    interpolation: &MeshInterpolation,
+    stats: &mut RenderStats,
+) -> Result<(), RenderError> {
+    let world = frame.world;
+    let counters = &mut stats.mesh_points;
+    counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);
+    let (Some(mesh), Some(view)) = (&mut meshes.indirect, &interpolation.indirect) else { return Ok(()) };
+    counters.indirect.total = view.neighbourhoods.count(&mesh.store().points);
+    // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
+    let mut needed = Vec::new();
+    frame.trace_image(stats, |paths, stats| {
+        timed(&mut stats.seconds.mesh, || {
+            needed.extend(needed_points(paths, mesh.view(view).lookup).bricks());
+        });
+    })?;
+    let mut seconds = stats.seconds.mesh;
+    timed(&mut seconds, || {
+        let needed = PointMask::union(needed);
+        stats.mesh_points.indirect.needed += needed.len();
+        let transport = interpolation.transport();
+        stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
+    });
+    stats.seconds.mesh = seconds;
+    Ok(())
 }

@@ -56,6 +56,9 @@ impl IndirectSettings {
     /// Indirect light varies slowly: unless settings say otherwise, spacing and radius are this many times the direct mesh's.
     pub const COARSENESS: f32 = 2.0;
 
+    /// Bounces after which hardly any light is left.
+    pub const ALL_BOUNCES: u32 = 16;
+
     /// Points for indirect light, given those for direct light.
     pub fn coarser_points(points: &PointSettings) -> PointSettings {
         let mut points = points.clone();

@@ -14,7 +14,7 @@ use crate::image::metrics::{MetricsOptions, compare};
 use crate::image::tone::auto_exposure;
 use crate::render::{RenderStats, SessionError, StageSeconds};
 use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
-use crate::settings::{Integrator, Settings};
+use crate::settings::{IndirectForm, Integrator, Settings};
 
 /// The longer side of images of a quick run, pixels.
 const QUICK_SIDE: u32 = 32;
@@ -47,7 +47,9 @@ impl Opened {
         let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
         let backend = built?.backend;
         let OpenedScene { loaded, bare, .. } = choose_view(&opened, &backend).complete(opened);
-        let LoadedScene { scene, cameras, settings, .. } = loaded;
+        let LoadedScene { scene, cameras, mut settings, .. } = loaded;
+        // Ways to direct light are compared; light from points on surfaces goes with either.
+        settings.mesh.indirect.take_if(|indirect| indirect.form == IndirectForm::Surface);
         if scene.lights.is_empty() {
             return Err(BenchError::NoLights);
         }

@@ -5,13 +5,15 @@ use pulp::NullaryFnOnce;
 
 use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
+use crate::light_mesh::direct::DirectMesh;
+use crate::light_mesh::indirect::IndirectMesh;
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
-use crate::render::meshes::{LightMeshes, MeshInterpolation};
+use crate::render::meshes::MeshInterpolation;
 use crate::render::need::needed_points;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
-use crate::render::trace::{PathVertex, TilePaths, pixel_groups};
+use crate::render::trace::{PathVertex, TilePaths};
 use crate::simd::vectorize;
 use crate::world::World;
 
@@ -19,8 +21,10 @@ use crate::world::World;
 pub struct LightMeshIntegrator<'a, A> {
     /// What is shaded.
     pub world: World<'a, A>,
-    /// Its light meshes.
-    pub meshes: &'a mut LightMeshes,
+    /// Its mesh of direct light.
+    pub direct: &'a mut DirectMesh,
+    /// Its mesh of indirect light, if it has one in free space.
+    pub indirect: Option<&'a IndirectMesh>,
     /// How they are interpolated.
     pub interpolation: &'a MeshInterpolation,
 }
@@ -38,10 +42,10 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let Self { integrator: LightMeshIntegrator { world, meshes, interpolation }, tile, vertices, light } =
-            self;
+        let Self { integrator, tile, vertices, light } = self;
+        let LightMeshIntegrator { world, direct, indirect, interpolation } = integrator;
         let accel = world.accel;
-        let direct = meshes.direct.view(world.lights, &interpolation.direct);
+        let direct = direct.view(world.lights, &interpolation.direct);
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
         if interpolation.hybrid {
@@ -65,7 +69,7 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         counters.direct_fallbacks = scratch.fallbacks;
 
         light.iter_mut().for_each(|light| *light *= interpolation.direct_scale);
-        if let (Some(indirect), Some(view)) = (&meshes.indirect, &interpolation.indirect) {
+        if let (Some(indirect), Some(view)) = (indirect, &interpolation.indirect) {
             let indirect = indirect.view(view);
             let mut scratch = LookupScratch::for_tile();
             for (vertex, light) in vertices.iter().zip(&mut *light) {
@@ -74,23 +78,19 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
             counters.shadow_rays += scratch.rays;
             counters.indirect_fallbacks = scratch.fallbacks;
         }
-        if let Some(mesh) = &meshes.surface {
-            let groups = pixel_groups(vertices, tile.pixels(), &mesh.view().footprint);
-            counters.shadow_rays += mesh.illuminate(accel, &groups, interpolation.surface_scale, light);
-        }
         counters
     }
 }
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
     fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats) {
-        let Self { world, meshes, interpolation } = self;
+        let Self { world, direct, interpolation, .. } = self;
         let mut seconds = stats.seconds.mesh;
         timed(&mut seconds, || {
-            let lookup = meshes.direct.view(world.lights, &interpolation.direct).lookup;
+            let lookup = direct.view(world.lights, &interpolation.direct).lookup;
             let needed = needed_points(paths, lookup);
             stats.mesh_points.direct.needed += needed.len();
-            stats.add_direct(meshes.direct.evaluate(*world, &interpolation.direct, &needed));
+            stats.add_direct(direct.evaluate(*world, &interpolation.direct, &needed));
         });
         stats.seconds.mesh = seconds;
     }

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
 use crate::scene::{Falloff, Scene};
-use crate::settings::{Radius, Resolve, Settings};
+use crate::settings::{IndirectSettings, Radius, Resolve, Settings};
 
 /// What a file holds, and what was chosen for it.
 pub struct OpenedScene {
@@ -50,7 +50,8 @@ impl OpenedScene {
         // Shadow edges are traced, for which mesh points in the first layer in front of surfaces will do.
         settings.shading.kernel.radius = Radius::Spacings(1.2);
         settings.shading.resolve = Resolve::Trace;
-        let choices = vec!["shadow edges traced".to_owned()];
+        settings.derive_indirect().bounces = IndirectSettings::ALL_BOUNCES;
+        let choices = vec!["shadow edges traced".to_owned(), "light from surfaces".to_owned()];
         let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
         Self { loaded, choices, bare: true }
     }

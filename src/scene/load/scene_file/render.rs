@@ -45,7 +45,8 @@ impl PresetName {
                 shading.resolve = Resolve::Trace;
                 shading.kernel.radius = Radius::Spacings(1.5);
                 shading.indirect.at_surface = true;
-                mesh.indirect = Some(IndirectSettings { bounces: 16, ..IndirectSettings::default() });
+                let bounces = IndirectSettings::ALL_BOUNCES;
+                mesh.indirect = Some(IndirectSettings { bounces, ..IndirectSettings::default() });
             }
         }
     }
