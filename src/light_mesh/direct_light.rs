@@ -17,6 +17,8 @@ pub struct DirectLight {
     unoccluded: Vec<f32>,
     /// Points and lights that a ray is traced between, as indices of the above, and what their light is multiplied by.
     chosen: Vec<(usize, f32)>,
+    /// Length of the rows of `unoccluded`.
+    row: usize,
     /// Rays traced.
     pub rays: u64,
 }
@@ -57,6 +59,7 @@ impl DirectLight {
             lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
         }
         let count = lights.chunks().len() * LANES;
+        self.row = count;
         let above = self.unoccluded.iter().filter(|&&amount| amount > 0.0).count();
         self.chosen.clear();
         if above <= LANES {
@@ -95,7 +98,9 @@ impl DirectLight {
         let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
         let (mut sum, mut amounts) = (Vec3::ZERO, [0.0f32; N]);
         for (lane, &(light, factor)) in self.chosen.iter().enumerate() {
-            if blocked >> lane & 1 == 0 {
+            if blocked >> lane & 1 == 1 {
+                self.unoccluded[light] *= HIDDEN;
+            } else {
                 let intensity = Vec3::from_array(lights.intensity(light % count / LANES, light % LANES));
                 let amount = self.unoccluded[light] * factor;
                 amounts[light / count] += amount;
@@ -108,7 +113,17 @@ impl DirectLight {
         let unevenness = if most > 0.0 { (most - least) * count / amounts.iter().sum::<f32>() } else { 0.0 };
         (sum / count, unevenness)
     }
+
+    /// After [`Self::mean`], of the lights above the horizon of some of the surface points: their indices and what they may give all of them
+    /// together, of which those that were seen to be hidden count a part.
+    pub fn amounts(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let amount = |light: usize| self.unoccluded.iter().skip(light).step_by(self.row).sum::<f32>();
+        (0..self.row).map(move |light| (light as u32, amount(light))).filter(|(_, amount)| *amount > 0.0)
+    }
 }
+
+/// Part of what a hidden light would give that is still expected of it nearby.
+const HIDDEN: f32 = 0.2;
 
 /// Writes what lights give a surface without occluders: the sum of the colours.
 struct Unoccluded<'a> {

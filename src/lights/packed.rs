@@ -231,6 +231,23 @@ impl PackedLights {
         factors
     }
 
+    /// φ2 · cone / φ1 of one light at a surface point: what its intensity is multiplied by.
+    #[inline(always)]
+    pub(crate) fn factor(&self, index: usize, light: usize, surface: &SurfacePoint) -> f32 {
+        let chunk = &self.chunks[index];
+        let d = chunk.to_light(light, surface.position.to_array());
+        let to_light = Vec3::from_array(d);
+        let cosine = surface.shading_normal.dot(to_light);
+        if cosine <= 0.0 || surface.geometric_normal.dot(to_light) <= 0.0 {
+            return 0.0;
+        }
+        let distance = to_light.length().max(TINY_DISTANCE);
+        with_falloff!(self.falloff, law => cosine * match &chunk.kinds {
+            Some(kinds) => kinds.cone(light, d, distance) * kinds.over_distance(light, law, distance),
+            None => law.over_distance(distance),
+        })
+    }
+
     /// Passes every chunk to `incident`, as seen from the point `x`.
     #[inline(always)]
     pub(crate) fn incident_at(&self, x: Vec3, incident: &mut impl IncidentLights) {

@@ -98,8 +98,9 @@ impl LightMeshes {
             // Before anything is changed: an error leaves all as it is.
             let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
             self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
-            self.surface =
-                of_form(true).zip(width).map(|(indirect, width)| SurfaceMesh::new(indirect, width));
+            self.surface = of_form(true)
+                .zip(width)
+                .map(|(indirect, width)| SurfaceMesh::new(indirect, width, settings.shading.direct_scale()));
             self.indirect_identity = identity;
         }
         Ok(())

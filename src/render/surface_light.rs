@@ -41,7 +41,7 @@ pub fn evaluate_surface_light<A: Accel>(
         stats.seconds.mesh = seconds;
     })?;
     let mut seconds = stats.seconds.mesh;
-    timed(&mut seconds, || stats.add_surface(mesh.evaluate(world, settings.shading.direct_scale())));
+    timed(&mut seconds, || stats.add_surface(mesh.evaluate(world)));
     stats.seconds.mesh = seconds;
     Ok(())
 }

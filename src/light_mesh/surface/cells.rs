@@ -115,10 +115,6 @@ pub struct CellPoint {
     pub surface: SurfacePoint,
     /// Places spread over what it stands for.
     pub spread: [Vec3; 4],
-    /// What falls on it from lights.
-    pub direct: Vec3,
-    /// Whether that is so uneven that smaller cells tell more.
-    pub uneven: bool,
     /// Whether other points of the cell lie in about the same plane and are not seen by it.
     pub divided: bool,
 }
@@ -126,13 +122,7 @@ pub struct CellPoint {
 impl CellPoint {
     /// A point that stands for itself alone.
     pub fn alone(surface: &SurfacePoint) -> Self {
-        Self {
-            surface: *surface,
-            spread: [surface.position; 4],
-            direct: Vec3::ZERO,
-            uneven: false,
-            divided: false,
-        }
+        Self { surface: *surface, spread: [surface.position; 4], divided: false }
     }
 
     /// Points spread over what it stands for.

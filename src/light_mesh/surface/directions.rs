@@ -35,6 +35,11 @@ impl HemisphereDirections {
         Self { sets: (0..SETS as u32).map(set).collect() }
     }
 
+    /// Directions of a set.
+    pub fn count(&self) -> usize {
+        self.sets[0].len()
+    }
+
     /// The directions of a set, and the turn that takes them to a surface point.
     #[inline(always)]
     pub fn at(&self, set: u8, surface: &SurfacePoint) -> (&[Vec3], Mat3) {

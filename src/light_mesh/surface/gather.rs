@@ -7,13 +7,16 @@ use glam::Vec3;
 use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
+use super::cell_light::Candidate;
+use super::cells::{Cell, line_between};
 use super::directions::HemisphereDirections;
-use super::points::{FINEST, LastPlace, NO_POINT, SurfacePoints};
+use super::points::{LastPlace, NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+use crate::light_mesh::direct_light::DirectLight;
 use crate::light_mesh::packed_colour::PackedColour;
 use crate::sampling::hash_to_unit_cube;
-use crate::scene::{Ray, SurfacePoint};
-use crate::simd::vectorize;
+use crate::scene::{Falloff, Ray, SurfacePoint};
+use crate::simd::{LANES, vectorize};
 use crate::world::World;
 
 /// Rays of a packet.
@@ -22,11 +25,13 @@ const WIDTH: usize = 16;
 const POINTS_PER_BATCH: usize = 1024;
 /// Points per parallel task.
 const POINTS_PER_TASK: usize = 16;
+/// Light in a cell is uneven where it differs by more than this part of its mean.
+const UNEVEN: f32 = 1.0;
 
 /// What a ray found.
 #[derive(Clone, Copy, Debug)]
 pub struct GatheredRay {
-    /// Number of the point that stands for the surface that it found, or [`NO_POINT`] where that sends no light on.
+    /// Number of the point of level 0 that stands for the surface that it found, or [`NO_POINT`].
     pub point: u32,
     diffuse: PackedColour,
 }
@@ -34,9 +39,12 @@ pub struct GatheredRay {
 impl GatheredRay {
     const NOTHING: Self = Self { point: NO_POINT, diffuse: PackedColour::BLACK };
 
-    /// The point that stands for where it ended, and how much of the light there it brings along, times a weight.
-    pub fn carries(self, weight: f32) -> (u32, f32) {
-        (self.point, self.diffuse().element_sum() / 3.0 * weight)
+    /// Adds how much of the light at the point that stands for where it ended it brings along, times a weight, to what is known by point.
+    #[inline(always)]
+    pub fn add_to(self, amounts: &mut [f32], weight: f32) {
+        if let Some(amount) = amounts.get_mut(self.point as usize) {
+            *amount += self.diffuse().element_sum() / 3.0 * weight;
+        }
     }
 
     /// k_d where the ray ended.
@@ -51,8 +59,11 @@ impl GatheredRay {
 pub struct Gathered {
     /// Numbers of the points.
     pub points: Vec<u32>,
-    /// Sum over a point's rays of the light that needs no bounce: of emitters and background.
+    /// Sum over a point's rays of the light that needs nothing that other points gather: of emitters, of the background, and of lights over
+    /// one reflection.
     pub emitted: Vec<Vec3>,
+    /// What light from other points is multiplied by, for rays that end where none stands for the surface.
+    pub shares: Vec<f32>,
     /// Sum over a point's rays of 1/t.
     pub closeness: Vec<f32>,
     /// By point.
@@ -72,6 +83,7 @@ impl Gathered {
         self.points.append(&mut other.points);
         self.emitted.append(&mut other.emitted);
         self.closeness.append(&mut other.closeness);
+        self.shares.append(&mut other.shares);
         self.rays.append(&mut other.rays);
     }
 }
@@ -80,26 +92,29 @@ impl Gathered {
 pub struct Gather<'a, A> {
     /// The world.
     pub world: World<'a, A>,
+    /// What direct light is multiplied by before k_d.
+    pub scale: f32,
     /// The directions.
     pub directions: &'a HemisphereDirections,
     /// Which of them.
     pub range: Range<u32>,
-    /// Width of cells per distance: how finely light that comes from far away is told apart.
+    /// Width of cells per distance up to which their mean light will do where it is even.
     pub fineness: f32,
     /// Rays to emitters.
     pub emitter_samples: u32,
 }
 
-/// A ray for which the point that is wanted isn't known.
-struct Open {
+/// A ray that ended at a surface that sends light on.
+#[derive(Clone, Copy)]
+struct Arrival {
     /// Its index among the task's.
     ray: u32,
-    /// Level of the cells to look into next.
-    level: u8,
-    /// Level of the smallest cells that it asks for.
-    finest: u8,
     /// Where it ended.
     surface: SurfacePoint,
+    diffuse: Vec3,
+    distance: f32,
+    /// In [0, 1), evenly spread over the rays of a point: chooses a light.
+    number: f32,
 }
 
 /// A task's share.
@@ -108,14 +123,18 @@ struct Part {
     emitted: Vec<Vec3>,
     closeness: Vec<f32>,
     gathered: Vec<GatheredRay>,
-    /// Rays for which the point that is wanted isn't known.
-    open: Vec<Open>,
+    /// By ray: what comes along it from lights over one reflection.
+    direct: Vec<Vec3>,
+    /// Rays that ended in cells that were not surveyed.
+    open: Vec<Arrival>,
+    scratch: DirectLight,
+    /// Other rays.
     rays: u64,
 }
 
 impl<A: Accel> Gather<'_, A> {
-    /// Traces the rays of some points; cells that they end in are surveyed. Returns what they see, and the number of rays to emitters and
-    /// in surveys.
+    /// Traces the rays of some points; cells that they end in are surveyed. Returns what they see, and the number of rays to lights,
+    /// between points and in surveys.
     pub fn run(&self, points: &mut SurfacePoints, numbers: Vec<u32>) -> (Gathered, u64) {
         let mut gathered = Gathered::default();
         let mut rays = 0;
@@ -133,45 +152,112 @@ impl<A: Accel> Gather<'_, A> {
             .with_max_len(1)
             .map(|numbers| vectorize(GatherTask { gather: self, points, numbers }))
             .collect();
-        let mut rays = parts.iter().map(|part| part.rays).sum::<u64>();
-        for level in 0..=FINEST {
-            let of_level = |part: &Part| {
-                let open = part.open.iter().filter(|open| open.level == level);
-                open.map(|open| open.surface).collect::<Vec<SurfacePoint>>()
-            };
-            let surfaces: Vec<Vec<SurfacePoint>> = parts.iter().map(of_level).collect();
-            let tasks: Vec<Vec<&SurfacePoint>> = surfaces.iter().map(|task| task.iter().collect()).collect();
-            let (places, traced) = points.place(self.world, level, &tasks);
-            rays += traced;
-            for (part, places) in parts.iter_mut().zip(places) {
-                let mut places = places.into_iter();
-                let gathered = &mut part.gathered;
-                part.open.retain_mut(|open| {
-                    if open.level != level {
-                        return true;
-                    }
-                    open.level += 1;
-                    let Some(place) = places.next().flatten() else {
-                        // Where a cell has no point for a surface, smaller cells may.
-                        return true;
-                    };
-                    gathered[open.ray as usize].point = place;
-                    level < open.finest && points.uneven(place)
-                });
-            }
-        }
-        for part in &mut parts {
-            for Open { ray, surface, .. } in part.open.drain(..) {
-                let point = &mut part.gathered[ray as usize].point;
-                if *point == NO_POINT {
-                    *point = points.own(self.world, &surface);
-                }
-            }
+        let ends = parts.iter().flat_map(|part| &part.open);
+        let cells: Vec<Cell> = ends.map(|arrival| points.cells.at(0, arrival.surface.position)).collect();
+        let mut rays = points.survey(self.world, cells.into_iter());
+        let points = &*points;
+        let shares: Vec<Vec<f32>> =
+            parts.par_iter_mut().map(|part| vectorize(SettleTask { gather: self, points, part })).collect();
+        for (part, unknown) in parts.iter().zip(shares) {
+            rays += part.rays + part.scratch.rays;
             out.emitted.extend_from_slice(&part.emitted);
             out.closeness.extend_from_slice(&part.closeness);
             out.rays.extend_from_slice(&part.gathered);
+            out.shares.extend(unknown);
         }
         rays
+    }
+
+    /// Finds, for up to 16 rays, the points that stand for where they ended, and the light of lights there.
+    #[inline(always)]
+    fn settle(&self, points: &SurfacePoints, arrivals: &[Arrival], last: &mut LastPlace, part: &mut Part) {
+        let World { accel, lights, .. } = self.world;
+        let width = points.cells.width(0);
+        let mut nearest = [[NO_POINT; 2]; WIDTH];
+        let mut known: LaneMask = 0;
+        for (lane, arrival) in arrivals.iter().enumerate().take(WIDTH) {
+            match last.numbers(points, points.cells.at(0, arrival.surface.position)) {
+                Some(numbers) => {
+                    nearest[lane] = points.nearest(numbers, width, &arrival.surface);
+                    known |= 1 << lane;
+                }
+                None => part.open.push(*arrival),
+            }
+        }
+        let lanes = |mask: LaneMask| (0..WIDTH).filter(move |lane| mask >> lane & 1 == 1);
+        let divided = |number: u32| number != NO_POINT && points.divided(number);
+        // Where a wall divides a cell, the ray's end has to see the point.
+        let mut asking =
+            lanes(known).filter(|&lane| divided(nearest[lane][0])).fold(0, |mask, lane| mask | 1 << lane);
+        for _ in 0..2 {
+            if asking == 0 {
+                break;
+            }
+            let mut packet = RayPacket::<WIDTH>::empty();
+            for lane in lanes(asking) {
+                let point = points.surface(nearest[lane][0]);
+                packet.set_lane(lane, &line_between(&arrivals[lane].surface, point, width));
+            }
+            part.rays += u64::from(asking.count_ones());
+            let blocked = asking & accel.occluded_packet(asking, &mut packet, Coherence::Incoherent);
+            for lane in lanes(blocked) {
+                nearest[lane] = [nearest[lane][1], NO_POINT];
+            }
+            asking = blocked
+                & lanes(blocked)
+                    .filter(|&lane| nearest[lane][0] != NO_POINT)
+                    .fold(0, |mask, lane| mask | 1 << lane);
+        }
+
+        let mut packet = RayPacket::<WIDTH>::empty();
+        let mut active: LaneMask = 0;
+        let mut offered = [Vec3::ZERO; WIDTH];
+        let singular = lights.falloff() == Falloff::InverseSquare;
+        for lane in lanes(known) {
+            let Arrival { ray, surface, diffuse, distance, number } = &arrivals[lane];
+            let ray = *ray as usize;
+            let point = nearest[lane][0];
+            part.gathered[ray].point = point;
+            let reflected = *diffuse * self.scale;
+            // Where the surface bends or walls stand in between, no point stands for this one.
+            let Some(light) = (point != NO_POINT).then(|| points.light(point)).flatten() else {
+                part.direct[ray] =
+                    reflected * part.scratch.at(accel, lights, surface, self.footprint(*distance));
+                continue;
+            };
+            if light.unevenness <= UNEVEN && width <= self.fineness * distance {
+                part.direct[ray] = reflected * light.mean;
+                continue;
+            }
+            let Some(Candidate { light, weight, .. }) = light.choose(*number) else { continue };
+            let (chunk, index) = (light as usize / LANES, light as usize % LANES);
+            let mut factor = lights.factor(chunk, index, surface) * weight;
+            if factor <= 0.0 {
+                continue;
+            }
+            let origin = surface.ray_origin();
+            let way = Vec3::from_array(lights.chunks()[chunk].to_light(index, origin.to_array()));
+            if singular {
+                // As for squares in `DirectLight::at`: a ray stands for a part of the surface.
+                let near = self.footprint(*distance).powi(2) / (2.0 * PI);
+                let squared = way.length_squared();
+                factor *= squared / squared.hypot(near);
+            }
+            packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
+            active |= 1 << lane;
+            offered[lane] = reflected * Vec3::from_array(lights.intensity(chunk, index)) * factor;
+        }
+        part.rays += u64::from(active.count_ones());
+        let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);
+        for lane in lanes(active & !blocked) {
+            part.direct[arrivals[lane].ray as usize] = offered[lane];
+        }
+    }
+
+    /// Width of what a ray stands for at a distance: its share of the hemisphere, of all directions.
+    #[inline(always)]
+    fn footprint(&self, distance: f32) -> f32 {
+        distance * (PI / self.directions.count() as f32).sqrt()
     }
 
     /// Adds what emitters send to a point, over π and times N: the light of points on them, chosen by their power. Returns the number of
@@ -229,15 +315,17 @@ impl<A: Accel> NullaryFnOnce for GatherTask<'_, A> {
     fn call(self) -> Part {
         let Self { gather, points, numbers } = self;
         let World { accel, scene, emissive, .. } = gather.world;
-        let (mut part, mut last) = (Part::default(), <[LastPlace; FINEST as usize + 1]>::default());
+        let (mut part, mut last) = (Part::default(), LastPlace::default());
+        let mut arrivals = Vec::with_capacity(WIDTH);
         let count = gather.range.len() as f32;
         for &number in numbers {
             let surface = points.surface(number);
             let (directions, turn) = gather.directions.at(points.set(number), surface);
             let directions = &directions[gather.range.start as usize..gather.range.end as usize];
             let origin = surface.ray_origin();
+            let shift = hash_to_unit_cube(surface.position).x;
             let (mut emitted, mut closeness) = (Vec3::ZERO, 0.0);
-            for directions in directions.chunks(WIDTH) {
+            for (chunk, directions) in directions.chunks(WIDTH).enumerate() {
                 let mut packet = RayHitPacket::<WIDTH>::empty();
                 let mut active: LaneMask = 0;
                 let mut turned = [Vec3::ZERO; WIDTH];
@@ -250,14 +338,12 @@ impl<A: Accel> NullaryFnOnce for GatherTask<'_, A> {
                     }
                 }
                 accel.intersect_packet(active, &mut packet, Coherence::Incoherent);
-                for lane in 0..directions.len() {
-                    if active >> lane & 1 == 0 {
-                        part.gathered.push(GatheredRay::NOTHING);
-                        continue;
-                    }
+                let first = part.gathered.len();
+                part.gathered.resize(first + directions.len(), GatheredRay::NOTHING);
+                part.direct.resize(first + directions.len(), Vec3::ZERO);
+                for lane in (0..directions.len()).filter(|lane| active >> lane & 1 == 1) {
                     let Some(hit) = hit_of_lane(&packet, lane) else {
                         emitted += scene.background;
-                        part.gathered.push(GatheredRay::NOTHING);
                         continue;
                     };
                     let seen = scene.interaction(&hit, turned[lane]);
@@ -268,33 +354,62 @@ impl<A: Accel> NullaryFnOnce for GatherTask<'_, A> {
                         let weight = ours / gather.pdf(directions[lane].z, pdf);
                         emitted += seen.emission * if weight.is_finite() { weight } else { 0.0 };
                     }
-                    if seen.diffuse == Vec3::ZERO {
-                        part.gathered.push(GatheredRay::NOTHING);
-                        continue;
+                    if seen.diffuse != Vec3::ZERO {
+                        part.gathered[first + lane].diffuse = PackedColour::new(seen.diffuse);
+                        let index = (chunk * WIDTH + lane) as u32 + gather.range.start;
+                        arrivals.push(Arrival {
+                            ray: (first + lane) as u32,
+                            surface: seen.point,
+                            diffuse: seen.diffuse,
+                            distance: hit.t,
+                            number: (shift + GOLDEN * index as f32).fract(),
+                        });
                     }
-                    let finest = points.level_of(gather.fineness * hit.t);
-                    let (mut point, mut level) = (NO_POINT, 0);
-                    loop {
-                        let last = &mut last[usize::from(level)];
-                        let place = last.find(points, accel, level, &seen.point, &mut part.rays);
-                        point = place.unwrap_or(point);
-                        if place.is_some_and(|place| level >= finest || !points.uneven(place)) {
-                            break;
-                        }
-                        if place.is_none() {
-                            let ray = part.gathered.len() as u32;
-                            part.open.push(Open { ray, level, finest, surface: seen.point });
-                            break;
-                        }
-                        level += 1;
-                    }
-                    part.gathered.push(GatheredRay { point, diffuse: PackedColour::new(seen.diffuse) });
                 }
+                gather.settle(points, &arrivals, &mut last, &mut part);
+                arrivals.clear();
             }
             part.rays += gather.add_emitters(surface, &mut emitted);
             part.emitted.push(emitted);
             part.closeness.push(closeness);
         }
         part
+    }
+}
+
+/// Multiples of it, modulo 1, lie as evenly as any sequence of numbers can.
+const GOLDEN: f32 = 0.618_034;
+
+/// Settling the rest of the rays of a task, when all cells are known: returns, by point, all that its rays would bring along over what
+/// those bring that end near a point.
+struct SettleTask<'a, A> {
+    gather: &'a Gather<'a, A>,
+    points: &'a SurfacePoints,
+    part: &'a mut Part,
+}
+
+impl<A: Accel> NullaryFnOnce for SettleTask<'_, A> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<f32> {
+        let Self { gather, points, part } = self;
+        let mut last = LastPlace::default();
+        for arrivals in std::mem::take(&mut part.open).chunks(WIDTH) {
+            gather.settle(points, arrivals, &mut last, part);
+        }
+        let count = gather.range.len().max(1);
+        let of_point = |(index, emitted): (usize, &mut Vec3)| {
+            let rays = index * count..(index + 1) * count;
+            *emitted += part.direct[rays.clone()].iter().sum::<Vec3>();
+            let (mut all, mut known) = (0.0, 0.0);
+            for ray in &part.gathered[rays] {
+                let amount = ray.diffuse().element_sum();
+                all += amount;
+                known += if ray.point == NO_POINT { 0.0 } else { amount };
+            }
+            if known > 0.0 { all / known } else { 1.0 }
+        };
+        part.emitted.iter_mut().enumerate().map(of_point).collect()
     }
 }

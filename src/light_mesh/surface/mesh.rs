@@ -11,7 +11,6 @@ use super::gather::{Gather, Gathered};
 use super::interpolate::{interpolate, neighbours};
 use super::pixels::PixelGroups;
 use super::points::{FINEST, LastPlace, SurfacePoints};
-use super::solve::FallingLight;
 use super::sources::RecordRays;
 use crate::accel::Accel;
 use crate::scene::{PixelFootprint, SurfacePoint};
@@ -31,9 +30,10 @@ pub struct SurfaceMesh {
     view: SurfaceView,
     /// By point.
     pub(super) states: Vec<State>,
-    pub(super) light: FallingLight,
-    /// Points that rays end at.
-    pub(super) ends: Vec<u32>,
+    /// What direct light is multiplied by before k_d.
+    scale: f32,
+    /// By point: what falls on sources from surfaces over π.
+    pub(super) indirect: Vec<Vec3>,
     /// By point: what falls on records from surfaces over π.
     received: Vec<Vec3>,
     /// Records that surface points around each are interpolated from, by point: stretches of `lists`.
@@ -64,8 +64,6 @@ pub(super) struct State {
     /// Whether light from surfaces is known: as a record, as a source.
     received: bool,
     pub(super) solved: bool,
-    /// Whether rays end at it.
-    pub(super) seen: bool,
     /// Whether it is a record of the view.
     listed: bool,
 }
@@ -78,8 +76,8 @@ const LEAST_PIXELS: f32 = 4.0;
 /// grow with the picture.
 const MOST_PIXELS: f32 = 8.0;
 const MOST_OF_HEIGHT: f32 = 1.0 / 32.0;
-/// Width of cells, per distance along a ray, that tell uneven light of lights apart.
-const FINENESS: f32 = 0.15;
+/// Width of cells, per distance along a ray, whose mean light will do.
+const FINENESS: f32 = 0.5;
 
 /// What the evaluation of a surface mesh took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -95,8 +93,8 @@ pub struct SurfaceEvaluation {
 }
 
 impl SurfaceMesh {
-    /// With no point known; cells have the given width.
-    pub fn new(settings: &IndirectSettings, width: f32) -> Self {
+    /// With no point known; cells have the given width, `scale` is that of direct light.
+    pub fn new(settings: &IndirectSettings, width: f32, scale: f32) -> Self {
         let footprint = PixelFootprint { eye: Vec3::ZERO, edge: 0.0 };
         Self {
             settings: settings.clone(),
@@ -104,8 +102,8 @@ impl SurfaceMesh {
             directions: HemisphereDirections::new(settings.directions),
             view: SurfaceView { footprint, height: 1 },
             states: Vec::new(),
-            light: FallingLight::default(),
-            ends: Vec::new(),
+            scale,
+            indirect: Vec::new(),
             received: Vec::new(),
             list_of: Vec::new(),
             lists: Vec::new(),
@@ -172,7 +170,7 @@ impl SurfaceMesh {
             });
         }
         for Left { surface, found, .. } in tiles.into_iter().flatten() {
-            records.push(found.unwrap_or_else(|| self.points.own(world, surface)));
+            records.push(found.unwrap_or_else(|| self.points.own(surface)));
         }
         self.extend();
         let states = &mut self.states;
@@ -202,10 +200,9 @@ impl SurfaceMesh {
         lists.iter().map(|(_, rays)| rays).sum()
     }
 
-    /// Evaluates the records of the view, and all that they depend on; `scale` is that of direct light.
-    pub fn evaluate<A: Accel>(&mut self, world: World<A>, scale: f32) -> SurfaceEvaluation {
+    /// Evaluates the records of the view, and all that they depend on.
+    pub fn evaluate<A: Accel>(&mut self, world: World<A>) -> SurfaceEvaluation {
         let mut evaluation = SurfaceEvaluation::default();
-        self.light.scale = scale;
         // Sums must not depend on the order in which points were found.
         self.records.sort_by_cached_key(|&number| self.points.key(number));
         evaluation.shadow += self.list(world.accel);
@@ -224,14 +221,11 @@ impl SurfaceMesh {
 
         evaluation.shadow += self.points.link(world, &sight.records);
         let sources = self.find_sources(world, &sight, &looked_at, &mut evaluation);
-        // Of points that were seen before, too, the source may be new.
-        self.light.total_up(&self.points, &self.ends);
         let IndirectSettings { bounces, tolerance, .. } = self.settings;
-        sources.solve(&self.points, &self.ends, &mut self.light, bounces.saturating_sub(1), tolerance);
-        let mut received = sight.received(&looked_at, &self.light.total);
+        sources.solve(&mut self.indirect, bounces.saturating_sub(1), tolerance);
+        let mut received = sight.received(&looked_at, &self.indirect);
         if self.correct(&sources, &sight.records, &received) {
-            self.light.total_up(&self.points, &self.ends);
-            received = sight.received(&looked_at, &self.light.total);
+            received = sight.received(&looked_at, &self.indirect);
         }
         for (&number, light) in sight.records.iter().zip(received) {
             self.received[number as usize] = light;
@@ -265,6 +259,7 @@ impl SurfaceMesh {
         let share = range.len() as u32 * self.settings.emitter_samples;
         let gather = Gather {
             world,
+            scale: self.scale,
             directions: &self.directions,
             emitter_samples: share / self.settings.directions.max(1),
             range,
@@ -303,7 +298,7 @@ impl SurfaceMesh {
     pub(super) fn extend(&mut self) {
         let count = self.points.len();
         self.states.resize(count, State::default());
-        self.light.resize(count);
+        self.indirect.resize(count, Vec3::ZERO);
         self.received.resize(count, Vec3::ZERO);
         self.list_of.resize(count, 0..0);
     }
@@ -361,9 +356,9 @@ impl SurfaceMesh {
     pub fn memory_bytes(&self) -> usize {
         self.points.memory_bytes()
             + self.states.capacity() * size_of::<State>()
-            + (2 * self.light.total.capacity() + self.received.capacity()) * size_of::<Vec3>()
+            + (self.indirect.capacity() + self.received.capacity()) * size_of::<Vec3>()
             + self.list_of.capacity() * size_of::<Range<u32>>()
-            + (self.lists.capacity() + self.ends.capacity() + self.records.capacity()) * size_of::<u32>()
+            + (self.lists.capacity() + self.records.capacity()) * size_of::<u32>()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The surface mesh: indirect light at points that lie on surfaces (docs/method.md §5).
 
+mod cell_light;
 mod cells;
 mod directions;
 mod gather;

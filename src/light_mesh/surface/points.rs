@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::cell_light::CellLight;
 use super::cells::{Cell, CellPoint, Cells, line_between, survey};
 use crate::accel::Accel;
 use crate::light_mesh::direct_light::DirectLight;
@@ -16,8 +17,6 @@ use crate::world::World;
 /// Levels of cells; the finest are this many times halved.
 pub const FINEST: u8 = 3;
 
-/// Light in a cell is uneven where it differs by more than this part of its mean.
-const UNEVEN: f32 = 1.0;
 /// Number of no point.
 pub const NO_POINT: u32 = u32::MAX;
 /// In place of the number of a point that nobody has looked for yet.
@@ -33,6 +32,8 @@ pub struct SurfacePoints {
     /// What a search reads of each, for which memory is waited for more than for anything else.
     sights: Vec<PointSight>,
     levels: Vec<u8>,
+    /// What falls on points of level 0 from lights.
+    lights: Vec<CellLight>,
     /// By point: the point of level 0 that stands for it, or a reason why there is none.
     parents: Vec<u32>,
 }
@@ -43,7 +44,8 @@ struct PointSight {
     position: Vec3,
     normal: Vec3,
     divided: bool,
-    uneven: bool,
+    /// Where its light is among that of points of level 0.
+    light: u32,
 }
 
 /// Cosine between the normals of a surface point and of a point that stands for it, at least.
@@ -58,6 +60,7 @@ impl SurfacePoints {
             points: Vec::new(),
             sights: Vec::new(),
             levels: Vec::new(),
+            lights: Vec::new(),
             parents: Vec::new(),
         }
     }
@@ -73,16 +76,16 @@ impl SurfacePoints {
         &self.points[number as usize].surface
     }
 
-    /// What falls on a point from lights.
+    /// What falls on a point of level 0 from lights.
     #[inline(always)]
-    pub fn direct(&self, number: u32) -> Vec3 {
-        self.points[number as usize].direct
+    pub fn light(&self, number: u32) -> Option<&CellLight> {
+        self.lights.get(self.sights[number as usize].light as usize)
     }
 
-    /// Whether lights light what a point stands for so unevenly that smaller cells tell more.
+    /// Whether a point must be seen from what it stands for.
     #[inline(always)]
-    pub fn uneven(&self, number: u32) -> bool {
-        self.sights[number as usize].uneven
+    pub fn divided(&self, number: u32) -> bool {
+        self.sights[number as usize].divided
     }
 
     /// Level of the cell of a point.
@@ -114,20 +117,22 @@ impl SurfacePoints {
         let mut seen = HashSet::<u64, BuildKeyHasher>::default();
         let new: Vec<Cell> =
             cells.filter(|cell| !self.by_cell.contains_key(&cell.key()) && seen.insert(cell.key())).collect();
-        let found: Vec<(Vec<CellPoint>, u64)> = new
+        let found: Vec<(Vec<CellPoint>, Vec<CellLight>, u64)> = new
             .par_iter()
             .with_min_len(4)
             .map_init(DirectLight::default, |direct, &cell| {
-                let (mut points, rays) = survey(world.accel, world.scene, &self.cells, cell);
+                let (points, rays) = survey(world.accel, world.scene, &self.cells, cell);
                 direct.rays = 0;
+                // Light of lights is asked for in cells of level 0 only.
+                let lit = if cell.level == 0 { &points[..] } else { &[] };
                 let width = self.cells.width(cell.level);
-                points.iter_mut().for_each(|point| light_up(world, point, width, direct));
-                (points, rays + direct.rays)
+                let lights = lit.iter().map(|point| CellLight::new(world, point, width, direct)).collect();
+                (points, lights, rays + direct.rays)
             })
             .collect();
         let mut rays = 0;
-        for (cell, (points, traced)) in new.into_iter().zip(found) {
-            self.add(cell.key(), cell.level, &points);
+        for (cell, (points, lights, traced)) in new.into_iter().zip(found) {
+            self.add(cell.key(), cell.level, &points, lights);
             rays += traced;
         }
         rays
@@ -181,15 +186,18 @@ impl SurfacePoints {
         surfaces.iter().filter_map(cell).collect()
     }
 
-    fn add(&mut self, key: u64, level: u8, points: &[CellPoint]) {
+    fn add(&mut self, key: u64, level: u8, points: &[CellPoint], lights: Vec<CellLight>) {
         self.by_cell.insert(key, (self.points.len() as u32, points.len() as u32));
         self.points.extend_from_slice(points);
-        self.sights.extend(points.iter().map(|point| PointSight {
+        let lit = self.lights.len()..self.lights.len() + lights.len();
+        let light = lit.map(|index| index as u32).chain(std::iter::repeat(NO_POINT));
+        self.sights.extend(points.iter().zip(light).map(|(point, light)| PointSight {
             position: point.surface.position,
             normal: point.surface.shading_normal,
             divided: point.divided,
-            uneven: point.uneven,
+            light,
         }));
+        self.lights.extend(lights);
         self.levels.resize(self.points.len(), level);
         self.parents.resize(self.points.len(), UNLINKED);
     }
@@ -230,15 +238,12 @@ impl SurfacePoints {
     }
 
     /// A point that stands for itself alone, where no cell has one that does.
-    pub fn own<A: Accel>(&mut self, world: World<A>, surface: &SurfacePoint) -> u32 {
+    pub fn own(&mut self, surface: &SurfacePoint) -> u32 {
         let key = own_key(surface);
         if let Some(&(number, _)) = self.by_cell.get(&key) {
             return number;
         }
-        let level = FINEST + 1;
-        let mut point = CellPoint::alone(surface);
-        light_up(world, &mut point, self.cells.width(level), &mut DirectLight::default());
-        self.add(key, level, &[point]);
+        self.add(key, FINEST + 1, &[CellPoint::alone(surface)], Vec::new());
         self.points.len() as u32 - 1
     }
 
@@ -289,6 +294,20 @@ impl SurfacePoints {
         surface: &SurfacePoint,
         rays: &mut u64,
     ) -> Option<u32> {
+        let nearest = self.nearest(numbers, width, surface).into_iter();
+        nearest
+            .filter(|&number| number != NO_POINT)
+            .find(|&number| self.sees(accel, number, width, surface, rays))
+    }
+
+    /// The two of some points that stand best for a surface point, the better one first.
+    #[inline(always)]
+    pub fn nearest(
+        &self,
+        numbers: impl Iterator<Item = u32>,
+        width: f32,
+        surface: &SurfacePoint,
+    ) -> [u32; 2] {
         let mut nearest = [(f32::INFINITY, NO_POINT); 2];
         for number in numbers {
             let Some(score) = self.score(number, width, surface) else { continue };
@@ -298,8 +317,7 @@ impl SurfacePoints {
                 nearest[1] = (score, number);
             }
         }
-        let known = nearest.into_iter().map(|(_, number)| number).filter(|&number| number != NO_POINT);
-        known.into_iter().find(|&number| self.sees(accel, number, width, surface, rays))
+        nearest.map(|(_, number)| number)
     }
 
     fn sees<A: Accel>(
@@ -344,6 +362,7 @@ impl SurfacePoints {
         self.by_cell.capacity() * size_of::<(u64, (u32, u32))>()
             + self.points.capacity() * (size_of::<CellPoint>() + size_of::<PointSight>() + size_of::<u32>())
             + self.levels.capacity()
+            + self.lights.capacity() * size_of::<CellLight>()
     }
 }
 
@@ -364,23 +383,22 @@ impl LastPlace {
         surface: &SurfacePoint,
         rays: &mut u64,
     ) -> Option<u32> {
-        let cell = points.cells.at(level, surface.position);
-        let numbers = match &self.last {
-            Some((last, numbers)) if *last == cell => numbers.clone(),
-            _ => {
-                let numbers = points.of_cell(cell).unwrap_or_default();
-                self.last = Some((cell, numbers.clone()));
-                numbers
-            }
-        };
+        let numbers = self.numbers(points, points.cells.at(level, surface.position)).unwrap_or_default();
         points.find_in(accel, numbers, level, surface, rays)
     }
-}
 
-/// Finds what falls on a point from lights.
-fn light_up<A: Accel>(world: World<A>, point: &mut CellPoint, width: f32, direct: &mut DirectLight) {
-    let (light, unevenness) = direct.mean(world.accel, world.lights, &point.spread(), 0.5 * width);
-    (point.direct, point.uneven) = (light, unevenness > UNEVEN);
+    /// The points of a cell that was surveyed.
+    #[inline(always)]
+    pub fn numbers(&mut self, points: &SurfacePoints, cell: Cell) -> Option<Range<u32>> {
+        if let Some((last, numbers)) = &self.last
+            && *last == cell
+        {
+            return Some(numbers.clone());
+        }
+        let numbers = points.of_cell(cell)?;
+        self.last = Some((cell, numbers.clone()));
+        Some(numbers)
+    }
 }
 
 /// A hash of a surface point.

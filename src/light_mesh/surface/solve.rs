@@ -4,60 +4,25 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::gather::Gathered;
-use super::points::SurfacePoints;
 use crate::light_mesh::series::Series;
 
-/// Light that falls on points, by number.
-#[derive(Default)]
-pub struct FallingLight {
-    /// What direct light is multiplied by.
-    pub scale: f32,
-    /// From surfaces, over π, on points of level 0.
-    pub indirect: Vec<Vec3>,
-    /// From lights and surfaces, the latter that of the cell of level 0 around a small one, times the scale of the former.
-    pub total: Vec<Vec3>,
-}
-
-impl FallingLight {
-    /// Makes room for as many points.
-    pub fn resize(&mut self, count: usize) {
-        for light in [&mut self.indirect, &mut self.total] {
-            light.resize(count, Vec3::ZERO);
-        }
-    }
-
-    /// Brings the totals of some points up to date.
-    pub fn total_up(&mut self, points: &SurfacePoints, numbers: &[u32]) {
-        for &number in numbers {
-            let indirect = self.indirect.get(points.parent(number) as usize).copied().unwrap_or_default();
-            self.total[number as usize] = self.scale * points.direct(number) + indirect;
-        }
-    }
-}
-
 impl Gathered {
-    /// Sum of the light that reaches the point of an index along its rays, given what falls on each point.
+    /// Sum of the light that reaches the point of an index along its rays, given what falls on each point from surfaces.
     #[inline(always)]
-    pub fn sum(&self, index: usize, total: &[Vec3]) -> Vec3 {
-        let mut sum = self.emitted.get(index).copied().unwrap_or_default();
+    pub fn sum(&self, index: usize, indirect: &[Vec3]) -> Vec3 {
+        let mut sum = Vec3::ZERO;
         for ray in self.rays_of(index) {
-            if let Some(&light) = total.get(ray.point as usize) {
+            if let Some(&light) = indirect.get(ray.point as usize) {
                 sum += ray.diffuse() * light;
             }
         }
-        sum
+        let share = self.shares.get(index).copied().unwrap_or(1.0);
+        self.emitted.get(index).copied().unwrap_or_default() + share * sum
     }
 
-    /// Finds the light of at most `bounces` bounces from surfaces that falls on its points, which are of level 0; `numbers` are those whose
-    /// totals depend on that. Ends when nothing changes by more than a tolerance.
-    pub fn solve(
-        &self,
-        points: &SurfacePoints,
-        numbers: &[u32],
-        light: &mut FallingLight,
-        bounces: u32,
-        tolerance: f32,
-    ) {
+    /// Finds the light of at most `bounces` bounces from surfaces that falls on its points, over π: adds it to that which is known, by
+    /// number. Ends when nothing changes by more than a tolerance.
+    pub fn solve(&self, indirect: &mut [Vec3], bounces: u32, tolerance: f32) {
         if self.points.is_empty() {
             return;
         }
@@ -68,14 +33,13 @@ impl Gathered {
             let mut after: Vec<[f32; 3]> = (0..self.points.len())
                 .into_par_iter()
                 .with_min_len(64)
-                .map(|index| (self.sum(index, &light.total) * share).to_array())
+                .map(|index| (self.sum(index, indirect) * share).to_array())
                 .collect();
             let remaining = bounces - 1 - bounce;
             let done = series.add(before.as_flattened(), after.as_flattened_mut(), remaining, tolerance);
             for (&number, value) in self.points.iter().zip(&after) {
-                light.indirect[number as usize] = Vec3::from_array(*value);
+                indirect[number as usize] = Vec3::from_array(*value);
             }
-            light.total_up(points, numbers);
             before = after;
             if done {
                 break;

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use super::directions::half;
 use super::gather::{Gathered, GatheredRay};
 use super::mesh::{SurfaceEvaluation, SurfaceMesh};
-use super::points::NO_POINT;
 use crate::accel::Accel;
 use crate::world::World;
 
@@ -35,11 +34,11 @@ impl RecordRays {
         })
     }
 
-    /// What each record receives, given what falls on each point.
-    pub fn received(&self, looked_at: &[usize], total: &[Vec3]) -> Vec<Vec3> {
+    /// What each record receives, given what falls on each point from surfaces.
+    pub fn received(&self, looked_at: &[usize], indirect: &[Vec3]) -> Vec<Vec3> {
         let share = 1.0 / self.count.max(1) as f32;
         let of = |(index, &looked_at): (usize, &usize)| {
-            (self.looked.sum(looked_at, total) + self.rest.sum(index, total)) * share
+            (self.looked.sum(looked_at, indirect) + self.rest.sum(index, indirect)) * share
         };
         looked_at.par_iter().enumerate().with_min_len(64).map(of).collect()
     }
@@ -57,43 +56,37 @@ impl SurfaceMesh {
         looked_at: &[usize],
         evaluation: &mut SurfaceEvaluation,
     ) -> Gathered {
-        let weight = 1.0 / sight.records.len().max(1) as f32;
-        let share = weight / self.settings.directions.max(1) as f32;
-        let mut carried: Vec<(u32, f32)> = sight.rays(looked_at).map(|ray| ray.carries(share)).collect();
-        let mut new = self.first_seen(&carried);
         let mut sources = Gathered::default();
         if self.settings.bounces < 2 {
             return sources;
         }
-        let mut importance = HashMap::<u32, f32>::new();
-        loop {
-            evaluation.shadow += self.points.link(world, &new);
-            self.extend();
-            for (number, amount) in carried.drain(..).filter(|(number, _)| *number != NO_POINT) {
-                let parent = self.points.parent(number);
-                if parent != NO_POINT && !self.states[parent as usize].solved {
-                    *importance.entry(parent).or_default() += amount;
-                }
-            }
-            let Some(chosen) = self.choose(&mut importance) else { break };
+        let weight = 1.0 / sight.records.len().max(1) as f32;
+        let share = weight / self.settings.directions.max(1) as f32;
+        let mut importance = vec![0.0; self.points.len()];
+        for ray in sight.rays(looked_at) {
+            ray.add_to(&mut importance, share);
+        }
+        while let Some(chosen) = self.choose(&mut importance) {
             let numbers = chosen.iter().map(|&(number, _)| number).collect();
             let count = half(self.settings.directions);
             // Light of lights matters less after two bounces: wide cells will do.
             let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
             evaluation.evaluated += gathered.points.len() as u64;
+            importance.resize(self.points.len(), 0.0);
             for (rays, (_, amount)) in gathered.rays.chunks(count as usize).zip(&chosen) {
-                carried.extend(rays.iter().map(|ray| ray.carries(amount / count as f32)));
+                rays.iter().for_each(|ray| ray.add_to(&mut importance, amount / count as f32));
             }
-            new = self.first_seen(&carried);
             sources.append(gathered);
         }
         sources
     }
 
-    /// Takes sources out of those that some importance is known of, all but the least important; `None` if no other is left.
-    fn choose(&mut self, importance: &mut HashMap<u32, f32>) -> Option<Vec<(u32, f32)>> {
+    /// Takes sources out of those that some importance is known of, by number, all but the least important; `None` if no other is left.
+    fn choose(&mut self, importance: &mut [f32]) -> Option<Vec<(u32, f32)>> {
+        let unknown = |(number, amount): &(usize, &mut f32)| **amount > 0.0 && !self.states[*number].solved;
+        let important = importance.iter_mut().enumerate().filter(unknown);
         let mut sources: Vec<(u32, f32)> =
-            importance.iter().map(|(&number, &amount)| (number, amount)).collect();
+            important.map(|(number, amount)| (number as u32, std::mem::take(amount))).collect();
         let points = &self.points;
         sources.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| points.key(a.0).cmp(&points.key(b.0))));
         let mut left_out = 0.0;
@@ -102,11 +95,11 @@ impl SurfaceMesh {
             left_out > LEFT_OUT
         })?;
         let mut chosen = sources.split_off(first);
-        chosen.sort_by_cached_key(|&(number, _)| points.key(number));
-        for (number, _) in &chosen {
-            importance.remove(number);
-            self.states[*number as usize].solved = true;
+        for (number, amount) in sources {
+            importance[number as usize] = amount;
         }
+        chosen.sort_by_cached_key(|&(number, _)| points.key(number));
+        chosen.iter().for_each(|(number, _)| self.states[*number as usize].solved = true);
         Some(chosen)
     }
 
@@ -123,18 +116,8 @@ impl SurfaceMesh {
             }
         }
         for (&parent, (sum, count)) in &sums {
-            self.light.indirect[parent as usize] = sum / count;
+            self.indirect[parent as usize] = sum / count;
         }
         !sums.is_empty()
-    }
-
-    /// Those of the points that rays end at for the first time.
-    fn first_seen(&mut self, carried: &[(u32, f32)]) -> Vec<u32> {
-        let states = &mut self.states;
-        let new =
-            |&number: &u32| number != NO_POINT && !std::mem::replace(&mut states[number as usize].seen, true);
-        let new: Vec<u32> = carried.iter().map(|&(number, _)| number).filter(new).collect();
-        self.ends.extend(&new);
-        new
     }
 }
