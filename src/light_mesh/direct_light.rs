@@ -10,6 +10,15 @@ use crate::sampling::hash_to_unit_cube;
 use crate::scene::{Falloff, Ray, SurfacePoint};
 use crate::simd::{LANES, Lanes};
 
+/// A light that may be asked about.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Candidate {
+    /// Its index in the packed lights.
+    pub light: u32,
+    /// One over the probability with which it was chosen.
+    pub weight: f32,
+}
+
 /// I at single surface points, from at most 16 occlusion rays each.
 #[derive(Default)]
 pub struct DirectLight {
@@ -112,6 +121,30 @@ impl DirectLight {
         let count = N as f32;
         let unevenness = if most > 0.0 { (most - least) * count / amounts.iter().sum::<f32>() } else { 0.0 };
         (sum / count, unevenness)
+    }
+
+    /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface. `None` if none lies
+    /// above its horizon.
+    #[inline(always)]
+    pub fn choose(
+        &mut self,
+        lights: &PackedLights,
+        surface: &SurfacePoint,
+        number: f32,
+    ) -> Option<Candidate> {
+        self.unoccluded.clear();
+        let amounts = &mut self.unoccluded;
+        lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+        let sum = self.unoccluded.iter().sum::<f32>();
+        let mut left = number * sum;
+        let chosen = self.unoccluded.iter().position(|&amount| {
+            let here = amount > 0.0 && left < amount;
+            left -= amount;
+            here
+        });
+        // Rounding may pass them all by.
+        let light = chosen.or_else(|| self.unoccluded.iter().rposition(|&amount| amount > 0.0))?;
+        Some(Candidate { light: light as u32, weight: sum / self.unoccluded[light] })
     }
 
     /// After [`Self::mean`], of the lights above the horizon of some of the surface points: their indices and what they may give all of them

@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::cells::CellPoint;
 use crate::accel::Accel;
-use crate::light_mesh::direct_light::DirectLight;
+use crate::light_mesh::direct_light::{Candidate, DirectLight};
+use crate::sampling::hash_to_unit_cube;
 use crate::simd::LANES;
 use crate::world::World;
 
@@ -15,19 +16,9 @@ pub struct CellLight {
     pub mean: Vec3,
     /// Difference between the most and the least of it at the places, over the mean.
     pub unevenness: f32,
-    candidates: [Candidate; LANES],
+    /// Candidates, each with the end of the numbers that choose it.
+    candidates: [(Candidate, f32); LANES],
     count: u8,
-}
-
-/// A light that may be asked about.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Candidate {
-    /// Its index in the packed lights.
-    pub light: u32,
-    /// One over the probability that it is chosen of all lights.
-    pub weight: f32,
-    /// Up to where the numbers lie, from where those of the candidate before do, for which it is chosen of the candidates.
-    end: f32,
 }
 
 impl CellLight {
@@ -36,10 +27,10 @@ impl CellLight {
         let (mean, unevenness) = direct.mean(world.accel, world.lights, &point.spread(), 0.5 * width);
         let amounts: Vec<(u32, f32)> = direct.amounts().collect();
         let sum = amounts.iter().map(|(_, amount)| amount).sum::<f32>();
-        let mut light = Self { mean, unevenness, candidates: [Candidate::default(); LANES], count: 0 };
+        let mut light = Self { mean, unevenness, candidates: [Default::default(); LANES], count: 0 };
         let mut add = |light_index: u32, amount: f32, end: f32| {
             light.candidates[usize::from(light.count)] =
-                Candidate { light: light_index, weight: sum / amount, end };
+                (Candidate { light: light_index, weight: sum / amount }, end);
             light.count += 1;
         };
         if amounts.len() <= LANES {
@@ -50,7 +41,7 @@ impl CellLight {
             }
         } else {
             // Equal steps through the sum, from a start that belongs to the point.
-            let start = crate::sampling::hash_to_unit_cube(point.surface.position).y;
+            let start = hash_to_unit_cube(point.surface.position).y;
             let (mut passed, mut steps) = (0.0, 0.0f32);
             for &(index, amount) in &amounts {
                 passed += amount / sum * LANES as f32;
@@ -69,6 +60,7 @@ impl CellLight {
     #[inline(always)]
     pub fn choose(&self, number: f32) -> Option<Candidate> {
         let candidates = self.candidates.get(..usize::from(self.count))?;
-        candidates.iter().find(|candidate| number < candidate.end).or(candidates.last()).copied()
+        let chosen = candidates.iter().find(|(_, end)| number < *end).or(candidates.last());
+        chosen.map(|(candidate, _)| *candidate)
     }
 }

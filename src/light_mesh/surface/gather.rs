@@ -7,12 +7,11 @@ use glam::Vec3;
 use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
-use super::cell_light::Candidate;
 use super::cells::{Cell, line_between};
 use super::directions::HemisphereDirections;
 use super::points::{LastPlace, NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
-use crate::light_mesh::direct_light::DirectLight;
+use crate::light_mesh::direct_light::{Candidate, DirectLight};
 use crate::light_mesh::packed_colour::PackedColour;
 use crate::sampling::hash_to_unit_cube;
 use crate::scene::{Falloff, Ray, SurfacePoint};
@@ -184,6 +183,8 @@ impl<A: Accel> Gather<'_, A> {
                 None => part.open.push(*arrival),
             }
         }
+        // Lights are asked about by what the best point knows, seen or not.
+        let adviser = nearest.map(|[best, _]| best);
         let lanes = |mask: LaneMask| (0..WIDTH).filter(move |lane| mask >> lane & 1 == 1);
         let divided = |number: u32| number != NO_POINT && points.divided(number);
         // Where a wall divides a cell, the ray's end has to see the point.
@@ -219,17 +220,19 @@ impl<A: Accel> Gather<'_, A> {
             let point = nearest[lane][0];
             part.gathered[ray].point = point;
             let reflected = *diffuse * self.scale;
-            // Where the surface bends or walls stand in between, no point stands for this one.
-            let Some(light) = (point != NO_POINT).then(|| points.light(point)).flatten() else {
-                part.direct[ray] =
-                    reflected * part.scratch.at(accel, lights, surface, self.footprint(*distance));
-                continue;
-            };
-            if light.unevenness <= UNEVEN && width <= self.fineness * distance {
+            let mean = if point == NO_POINT { None } else { points.light(point) };
+            if let Some(light) = mean
+                && light.unevenness <= UNEVEN
+                && width <= self.fineness * distance
+            {
                 part.direct[ray] = reflected * light.mean;
                 continue;
             }
-            let Some(Candidate { light, weight, .. }) = light.choose(*number) else { continue };
+            let chosen = match adviser[lane] {
+                NO_POINT => part.scratch.choose(lights, surface, *number),
+                adviser => points.light(adviser).and_then(|light| light.choose(*number)),
+            };
+            let Some(Candidate { light, weight }) = chosen else { continue };
             let (chunk, index) = (light as usize / LANES, light as usize % LANES);
             let mut factor = lights.factor(chunk, index, surface) * weight;
             if factor <= 0.0 {
