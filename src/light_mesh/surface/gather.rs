@@ -53,7 +53,7 @@ impl GatheredRay {
     }
 }
 
-/// What some points see, each with as many rays.
+/// What some points see.
 #[derive(Default)]
 pub struct Gathered {
     /// Numbers of the points.
@@ -65,7 +65,9 @@ pub struct Gathered {
     pub shares: Vec<f32>,
     /// Sum over a point's rays of 1/t.
     pub closeness: Vec<f32>,
-    /// By point.
+    /// The rays of each point end here.
+    ends: Vec<usize>,
+    /// Rays, point by point.
     pub rays: Vec<GatheredRay>,
 }
 
@@ -73,16 +75,18 @@ impl Gathered {
     /// The rays of the point of an index, none if it has none.
     #[inline(always)]
     pub fn rays_of(&self, index: usize) -> &[GatheredRay] {
-        let count = self.rays.len().checked_div(self.points.len()).unwrap_or(0);
-        self.rays.get(index * count..(index + 1) * count).unwrap_or_default()
+        let end = |index: usize| self.ends.get(index).copied().unwrap_or_default();
+        self.rays.get(index.checked_sub(1).map_or(0, end)..end(index)).unwrap_or_default()
     }
 
-    /// Adds what other points see with as many rays.
+    /// Adds what other points see.
     pub fn append(&mut self, mut other: Self) {
         self.points.append(&mut other.points);
         self.emitted.append(&mut other.emitted);
         self.closeness.append(&mut other.closeness);
         self.shares.append(&mut other.shares);
+        let first = self.rays.len();
+        self.ends.extend(other.ends.into_iter().map(|end| first + end));
         self.rays.append(&mut other.rays);
     }
 }
@@ -140,6 +144,7 @@ impl<A: Accel> Gather<'_, A> {
         for batch in numbers.chunks(POINTS_PER_BATCH) {
             rays += self.add_batch(points, batch, &mut gathered);
         }
+        gathered.ends = (1..=numbers.len()).map(|index| index * self.range.len()).collect();
         gathered.points = numbers;
         (gathered, rays)
     }

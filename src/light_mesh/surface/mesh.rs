@@ -6,12 +6,12 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::directions::{HemisphereDirections, quarter};
+use super::directions::{HemisphereDirections, part};
 use super::gather::{Gather, Gathered};
 use super::interpolate::{interpolate, neighbours};
 use super::pixels::PixelGroups;
 use super::points::{FINEST, LastPlace, SurfacePoints};
-use super::sources::RecordRays;
+use super::sources::{RecordRays, RecordSight};
 use crate::accel::Accel;
 use crate::scene::{PixelFootprint, SurfacePoint};
 use crate::settings::IndirectSettings;
@@ -19,9 +19,10 @@ use crate::world::World;
 
 /// Points on surfaces with the light that falls on them from other surfaces.
 ///
-/// Points that surface points are interpolated from, records, gather with all directions; a quarter of these tell first whether smaller
-/// cells should take their place. What the rays hit is lit by lights at points of cells that are smaller where that light is uneven; light
-/// from surfaces is less so, and comes from points of level 0, sources, which gather it with half of the directions.
+/// Points that surface points are interpolated from, records, gather with all directions, where there are many in a cell with fewer; a
+/// quarter of these tell first whether smaller cells should take their place. What the rays hit belongs to points of level 0. Light of lights there
+/// is that of the point where it is even, and asked for with a shadow ray where it isn't. Light from surfaces comes from the point, a source, which
+/// gathers it with the more directions the more of its light arrives at records.
 pub struct SurfaceMesh {
     pub(super) settings: IndirectSettings,
     pub(super) points: SurfacePoints,
@@ -76,6 +77,10 @@ const LEAST_PIXELS: f32 = 4.0;
 /// grow with the picture.
 const MOST_PIXELS: f32 = 8.0;
 const MOST_OF_HEIGHT: f32 = 1.0 / 32.0;
+/// Points are looked at with one in so many directions.
+const LOOK: u32 = 4;
+/// Cells with more points, such as those full of leaves, are not made smaller for what is near: there is no end to it.
+const CROWD: u32 = 8;
 /// Width of cells, per distance along a ray, whose mean light will do.
 const FINENESS: f32 = 0.5;
 
@@ -211,33 +216,55 @@ impl SurfaceMesh {
         let new: Vec<u32> = self.records.iter().copied().filter(unknown).collect();
         evaluation.needed = self.records.len() as u64;
         evaluation.evaluated = new.len() as u64;
-        let count = self.settings.directions;
         self.look(world, new.clone(), &mut evaluation);
-        let rest = self.gather(world, quarter(count)..count, FINENESS, new.clone(), &mut evaluation);
-        let sight = RecordRays { looked: std::mem::take(&mut self.looked), rest, records: new, count };
-        let looked_at = |number: &u32| self.states[*number as usize].looked_at as usize - 1;
-        let looked_at: Vec<usize> = sight.records.iter().map(looked_at).collect();
-        sight.looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
-
-        evaluation.shadow += self.points.link(world, &sight.records);
-        let sources = self.find_sources(world, &sight, &looked_at, &mut evaluation);
+        let sight = self.see(world, &new, &mut evaluation);
+        evaluation.shadow += self.points.link(world, &new);
+        let sources = self.find_sources(world, &sight, &mut evaluation);
         let IndirectSettings { bounces, tolerance, .. } = self.settings;
         sources.solve(&mut self.indirect, bounces.saturating_sub(1), tolerance);
-        let mut received = sight.received(&looked_at, &self.indirect);
+        let mut received = sight.received(&self.indirect);
         if self.correct(&sources, &sight.records, &received) {
-            received = sight.received(&looked_at, &self.indirect);
+            received = sight.received(&self.indirect);
         }
-        for (&number, light) in sight.records.iter().zip(received) {
-            self.received[number as usize] = light;
-            self.states[number as usize].received = true;
+        for (record, light) in sight.records.iter().zip(received) {
+            self.received[record.number as usize] = light;
+            self.states[record.number as usize].received = true;
         }
         evaluation
+    }
+
+    /// Lets records, which were looked at, gather with the rest of their directions: of many points in a cell each adds less to a picture.
+    fn see<A: Accel>(
+        &mut self,
+        world: World<A>,
+        records: &[u32],
+        evaluation: &mut SurfaceEvaluation,
+    ) -> RecordRays {
+        let count = self.settings.directions;
+        let looked = std::mem::take(&mut self.looked);
+        let looked_at = |&number: &u32| self.states[number as usize].looked_at as usize - 1;
+        let mut sights: Vec<RecordSight> = records
+            .iter()
+            .map(|number| RecordSight { number: *number, looked: looked_at(number), rest: None })
+            .collect();
+        looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
+        let mut rest = Gathered::default();
+        for (crowd, of) in [(0..=CROWD, 1), (CROWD + 1..=2 * CROWD, 2)] {
+            let mut numbers = Vec::new();
+            for sight in sights.iter_mut().filter(|sight| crowd.contains(&self.points.crowd(sight.number))) {
+                sight.rest = Some(rest.points.len() + numbers.len());
+                numbers.push(sight.number);
+            }
+            let range = part(count, LOOK)..part(count, of);
+            rest.append(self.gather(world, range, FINENESS, numbers, evaluation));
+        }
+        RecordRays { looked, rest, records: sights }
     }
 
     /// Lets points that may become records look around, which shows how near other surfaces are.
     fn look<A: Accel>(&mut self, world: World<A>, mut numbers: Vec<u32>, evaluation: &mut SurfaceEvaluation) {
         numbers.retain(|&number| self.states[number as usize].looked_at == 0);
-        let count = quarter(self.settings.directions);
+        let count = part(self.settings.directions, LOOK);
         let gathered = self.gather(world, 0..count, FINENESS, numbers, evaluation);
         for (index, (&number, &closeness)) in gathered.points.iter().zip(&gathered.closeness).enumerate() {
             let state = &mut self.states[number as usize];
@@ -290,7 +317,8 @@ impl SurfaceMesh {
     #[inline(always)]
     fn refined(&self, number: u32) -> bool {
         let (most, least) = self.limits(self.points.surface(number).position);
-        let width = WIDTH_PER_DISTANCE * self.states[number as usize].distance;
+        let crowded = self.points.crowd(number) > CROWD;
+        let width = if crowded { most } else { WIDTH_PER_DISTANCE * self.states[number as usize].distance };
         self.points.level(number) < FINEST && self.points.width(number) > width.min(most).max(least)
     }
 

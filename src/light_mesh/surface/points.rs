@@ -32,6 +32,8 @@ pub struct SurfacePoints {
     /// What a search reads of each, for which memory is waited for more than for anything else.
     sights: Vec<PointSight>,
     levels: Vec<u8>,
+    /// By point: how many its cell has.
+    crowds: Vec<u32>,
     /// What falls on points of level 0 from lights.
     lights: Vec<CellLight>,
     /// By point: the point of level 0 that stands for it, or a reason why there is none.
@@ -60,6 +62,7 @@ impl SurfacePoints {
             points: Vec::new(),
             sights: Vec::new(),
             levels: Vec::new(),
+            crowds: Vec::new(),
             lights: Vec::new(),
             parents: Vec::new(),
         }
@@ -92,6 +95,12 @@ impl SurfacePoints {
     #[inline(always)]
     pub fn level(&self, number: u32) -> u8 {
         self.levels[number as usize]
+    }
+
+    /// How many points the cell of a point has.
+    #[inline(always)]
+    pub fn crowd(&self, number: u32) -> u32 {
+        self.crowds[number as usize]
     }
 
     /// Number of a set of directions for a point: other ones than its neighbours'.
@@ -199,6 +208,7 @@ impl SurfacePoints {
         }));
         self.lights.extend(lights);
         self.levels.resize(self.points.len(), level);
+        self.crowds.resize(self.points.len(), points.len() as u32);
         self.parents.resize(self.points.len(), UNLINKED);
     }
 
@@ -360,7 +370,8 @@ impl SurfacePoints {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.by_cell.capacity() * size_of::<(u64, (u32, u32))>()
-            + self.points.capacity() * (size_of::<CellPoint>() + size_of::<PointSight>() + size_of::<u32>())
+            + self.points.capacity()
+                * (size_of::<CellPoint>() + size_of::<PointSight>() + 2 * size_of::<u32>())
             + self.levels.capacity()
             + self.lights.capacity() * size_of::<CellLight>()
     }

@@ -26,14 +26,13 @@ impl Gathered {
         if self.points.is_empty() {
             return;
         }
-        let share = 1.0 / (self.rays.len() / self.points.len()) as f32;
         let mut series = Series::default();
         let mut before = vec![[0.0; 3]; self.points.len()];
         for bounce in 0..bounces {
             let mut after: Vec<[f32; 3]> = (0..self.points.len())
                 .into_par_iter()
                 .with_min_len(64)
-                .map(|index| (self.sum(index, indirect) * share).to_array())
+                .map(|index| (self.sum(index, indirect) / self.rays_of(index).len() as f32).to_array())
                 .collect();
             let remaining = bounces - 1 - bounce;
             let done = series.add(before.as_flattened(), after.as_flattened_mut(), remaining, tolerance);

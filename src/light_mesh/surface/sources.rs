@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::directions::half;
+use super::directions::part;
 use super::gather::{Gathered, GatheredRay};
 use super::mesh::{SurfaceEvaluation, SurfaceMesh};
 use crate::accel::Accel;
@@ -14,33 +14,44 @@ use crate::world::World;
 /// Part of the light of records that sources may leave out that send little of it.
 const LEFT_OUT: f32 = 5e-4;
 
-/// What records see: with the quarter of the directions with which they were looked at, and with the rest.
+/// What records see.
 pub struct RecordRays {
-    /// With the quarter.
+    /// With the directions with which they were looked at.
     pub looked: Gathered,
-    /// With the rest.
+    /// With others.
     pub rest: Gathered,
-    /// The records, by number.
-    pub records: Vec<u32>,
-    /// Directions.
-    pub count: u32,
+    /// The records.
+    pub records: Vec<RecordSight>,
+}
+
+/// Where what a record sees is found.
+#[derive(Clone, Copy)]
+pub struct RecordSight {
+    /// Number of the record.
+    pub number: u32,
+    /// Index among the looked at.
+    pub looked: usize,
+    /// Index among the rest.
+    pub rest: Option<usize>,
 }
 
 impl RecordRays {
-    /// All rays, record by record, given where each is among the looked at.
-    fn rays<'a>(&'a self, looked_at: &'a [usize]) -> impl Iterator<Item = GatheredRay> + 'a {
-        looked_at.iter().enumerate().flat_map(|(index, &looked_at)| {
-            self.looked.rays_of(looked_at).iter().chain(self.rest.rays_of(index)).copied()
-        })
+    /// The rays of a record: those with which it was looked at, and others.
+    #[inline(always)]
+    fn rays(&self, record: &RecordSight) -> [&[GatheredRay]; 2] {
+        let rest = record.rest.map_or(&[][..], |rest| self.rest.rays_of(rest));
+        [self.looked.rays_of(record.looked), rest]
     }
 
     /// What each record receives, given what falls on each point from surfaces.
-    pub fn received(&self, looked_at: &[usize], indirect: &[Vec3]) -> Vec<Vec3> {
-        let share = 1.0 / self.count.max(1) as f32;
-        let of = |(index, &looked_at): (usize, &usize)| {
-            (self.looked.sum(looked_at, indirect) + self.rest.sum(index, indirect)) * share
+    pub fn received(&self, indirect: &[Vec3]) -> Vec<Vec3> {
+        let of = |record: &RecordSight| {
+            let [looked, rest] = self.rays(record);
+            let sum = self.looked.sum(record.looked, indirect)
+                + record.rest.map_or(Vec3::ZERO, |index| self.rest.sum(index, indirect));
+            sum / (looked.len() + rest.len()).max(1) as f32
         };
-        looked_at.par_iter().enumerate().with_min_len(64).map(of).collect()
+        self.records.par_iter().with_min_len(64).map(of).collect()
     }
 }
 
@@ -53,7 +64,6 @@ impl SurfaceMesh {
         &mut self,
         world: World<A>,
         sight: &RecordRays,
-        looked_at: &[usize],
         evaluation: &mut SurfaceEvaluation,
     ) -> Gathered {
         let mut sources = Gathered::default();
@@ -61,22 +71,33 @@ impl SurfaceMesh {
             return sources;
         }
         let weight = 1.0 / sight.records.len().max(1) as f32;
-        let share = weight / self.settings.directions.max(1) as f32;
         let mut importance = vec![0.0; self.points.len()];
-        for ray in sight.rays(looked_at) {
-            ray.add_to(&mut importance, share);
+        for record in &sight.records {
+            let [looked, rest] = sight.rays(record);
+            let share = weight / (looked.len() + rest.len()).max(1) as f32;
+            looked.iter().chain(rest).for_each(|ray| ray.add_to(&mut importance, share));
         }
         while let Some(chosen) = self.choose(&mut importance) {
-            let numbers = chosen.iter().map(|&(number, _)| number).collect();
-            let count = half(self.settings.directions);
-            // Light of lights matters less after two bounces: wide cells will do.
-            let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
-            evaluation.evaluated += gathered.points.len() as u64;
-            importance.resize(self.points.len(), 0.0);
-            for (rays, (_, amount)) in gathered.rays.chunks(count as usize).zip(&chosen) {
-                rays.iter().for_each(|ray| ray.add_to(&mut importance, amount / count as f32));
+            let mean = chosen.iter().map(|(_, amount)| amount).sum::<f32>() / chosen.len() as f32;
+            // The noise of a source counts as much as its light does.
+            let share = |amount: f32| match amount / mean {
+                ..0.25 => 8,
+                ..1.0 => 4,
+                _ => 2,
+            };
+            for of in [2, 4, 8] {
+                let (numbers, amounts): (Vec<u32>, Vec<f32>) =
+                    chosen.iter().filter(|(_, amount)| share(*amount) == of).copied().unzip();
+                let count = part(self.settings.directions, of);
+                // Light of lights matters less after two bounces: wide cells will do.
+                let gathered = self.gather(world, 0..count, f32::INFINITY, numbers, evaluation);
+                evaluation.evaluated += gathered.points.len() as u64;
+                importance.resize(self.points.len(), 0.0);
+                for (rays, amount) in gathered.rays.chunks(count as usize).zip(&amounts) {
+                    rays.iter().for_each(|ray| ray.add_to(&mut importance, amount / count as f32));
+                }
+                sources.append(gathered);
             }
-            sources.append(gathered);
         }
         sources
     }
@@ -104,11 +125,11 @@ impl SurfaceMesh {
     }
 
     /// Puts what records receive in place of what new sources around them do, for they know better; returns whether there were any.
-    pub(super) fn correct(&mut self, sources: &Gathered, records: &[u32], received: &[Vec3]) -> bool {
+    pub(super) fn correct(&mut self, sources: &Gathered, records: &[RecordSight], received: &[Vec3]) -> bool {
         let new: HashSet<u32> = sources.points.iter().copied().collect();
         let mut sums = HashMap::<u32, (Vec3, f32)>::new();
-        for (&number, light) in records.iter().zip(received) {
-            let parent = self.points.parent(number);
+        for (record, light) in records.iter().zip(received) {
+            let parent = self.points.parent(record.number);
             if new.contains(&parent) {
                 let (sum, count) = sums.entry(parent).or_default();
                 *sum += *light;
