@@ -25,7 +25,7 @@ const POINTS_PER_BATCH: usize = 1024;
 /// Points per parallel task.
 const POINTS_PER_TASK: usize = 16;
 /// Light in a cell is uneven where it differs by more than this part of its mean.
-const UNEVEN: f32 = 1.0;
+const UNEVEN: f32 = 0.5;
 
 /// What a ray found.
 #[derive(Clone, Copy, Debug)]

@@ -19,7 +19,7 @@ use crate::world::World;
 
 /// Points on surfaces with the light that falls on them from other surfaces.
 ///
-/// Points that surface points are interpolated from, records, gather with all directions, where there are many in a cell with fewer; a
+/// Points that surface points are interpolated from, records, gather with all directions, with fewer if they stand for little of a view; a
 /// quarter of these tell first whether smaller cells should take their place. What the rays hit belongs to points of level 0. Light of lights there
 /// is that of the point where it is even, and asked for with a shadow ray where it isn't. Light from surfaces comes from the point, a source, which
 /// gathers it with the more directions the more of its light arrives at records.
@@ -65,22 +65,25 @@ pub(super) struct State {
     /// Whether light from surfaces is known: as a record, as a source.
     received: bool,
     pub(super) solved: bool,
-    /// Whether it is a record of the view.
-    listed: bool,
+    /// Surface points of the view that it is the nearest record of: if there are any, it is one.
+    stands_for: u32,
 }
 
 /// Widths of the cells of records: at most this part of the harmonic mean distance of what they see, which is how fast light changes there (Ward
-/// and Heckbert, 1992), but not so few pixels that it can't be seen.
+/// and Heckbert, 1992), but not so few pixels that it can't be seen, nor so small a part of the picture's height: the number of records does not
+/// grow with the picture.
 const WIDTH_PER_DISTANCE: f32 = 1.0 / 3.0;
 const LEAST_PIXELS: f32 = 4.0;
-/// Cells of records are at most so many pixels wide, or that part of the picture's height, whichever is more: the number of records does not
-/// grow with the picture.
-const MOST_PIXELS: f32 = 8.0;
-const MOST_OF_HEIGHT: f32 = 1.0 / 32.0;
+const LEAST_OF_HEIGHT: f32 = 1.0 / 64.0;
+/// The widest that they may be, over the narrowest.
+const MOST_PER_LEAST: f32 = 2.0;
 /// Points are looked at with one in so many directions.
 const LOOK: u32 = 4;
 /// Cells with more points, such as those full of leaves, are not made smaller for what is near: there is no end to it.
-const CROWD: u32 = 8;
+const CROWD: u32 = 12;
+/// Records that stand for less of the view than that part of a square of the least width gather with half of the directions, with less than
+/// half of it with a quarter.
+const WELL_SEEN: f32 = 0.25;
 /// Width of cells, per distance along a ray, whose mean light will do.
 const FINENESS: f32 = 0.5;
 
@@ -120,7 +123,7 @@ impl SurfaceMesh {
     /// Turns to another view: surface points that are needed from now on belong to it.
     pub fn turn_to(&mut self, view: SurfaceView) {
         self.view = view;
-        self.records.iter().for_each(|&number| self.states[number as usize].listed = false);
+        self.records.iter().for_each(|&number| self.states[number as usize].stands_for = 0);
         self.records.clear();
         self.lists.clear();
     }
@@ -143,44 +146,41 @@ impl SurfaceMesh {
             level: u8,
             /// The last point that was found has to do where smaller cells have none.
             found: Option<u32>,
+            /// Whether it will do.
+            done: bool,
         }
-        let left = |surface| Left { surface, level: self.first_level(surface), found: None };
+        let left = |surface| Left { surface, level: self.first_level(surface), found: None, done: false };
         let mut tiles: Vec<Vec<Left>> =
             tiles.into_par_iter().map(|tile| tile.into_iter().map(left).collect()).collect();
-        let mut records = Vec::new();
         for level in 0..=FINEST {
             let of_level = |tile: &Vec<Left<'s>>| {
-                tile.iter().filter(|left| left.level == level).map(|left| left.surface).collect()
+                let left = tile.iter().filter(|left| left.level == level && !left.done);
+                left.map(|left| left.surface).collect()
             };
             let tasks: Vec<Vec<&SurfacePoint>> = tiles.par_iter().map(of_level).collect();
             let (found, rays) = self.points.place(world, level, &tasks);
             evaluation.shadow += rays;
             self.extend();
-            let found_numbers = numbers(&found);
             let unknown = |number: &u32| self.states[*number as usize].distance == 0.0;
-            let new = found_numbers.iter().copied().filter(unknown).collect();
-            self.look(world, new, &mut evaluation);
-            records.extend(found_numbers.into_iter().filter(|&number| !self.refined(number)));
+            self.look(world, numbers(&found).into_iter().filter(unknown).collect(), &mut evaluation);
             tiles.par_iter_mut().zip(found).for_each(|(tile, found)| {
-                let mut found = found.into_iter();
-                tile.retain_mut(|left| {
-                    if left.level != level {
-                        return true;
-                    }
-                    let place = found.next().flatten();
+                let here = tile.iter_mut().filter(|left| left.level == level && !left.done);
+                for (left, place) in here.zip(found) {
                     left.level += 1;
                     left.found = place.or(left.found);
-                    place.is_none_or(|number| self.refined(number))
-                });
+                    left.done = place.is_some_and(|number| !self.refined(number));
+                }
             });
         }
         for Left { surface, found, .. } in tiles.into_iter().flatten() {
-            records.push(found.unwrap_or_else(|| self.points.own(surface)));
+            let number = found.unwrap_or_else(|| self.points.own(surface));
+            self.extend();
+            let standing = &mut self.states[number as usize].stands_for;
+            if *standing == 0 {
+                self.records.push(number);
+            }
+            *standing += 1;
         }
-        self.extend();
-        let states = &mut self.states;
-        records.retain(|&number| !std::mem::replace(&mut states[number as usize].listed, true));
-        self.records.extend(records);
         evaluation
     }
 
@@ -192,8 +192,13 @@ impl SurfaceMesh {
             .par_iter()
             .map(|&number| {
                 let mut list = Vec::new();
-                let rays =
-                    neighbours(accel, points, number, |other| states[other as usize].listed, &mut list);
+                let rays = neighbours(
+                    accel,
+                    points,
+                    number,
+                    |other| states[other as usize].stands_for > 0,
+                    &mut list,
+                );
                 (list, rays)
             })
             .collect();
@@ -233,7 +238,7 @@ impl SurfaceMesh {
         evaluation
     }
 
-    /// Lets records, which were looked at, gather with the rest of their directions: of many points in a cell each adds less to a picture.
+    /// Lets records, which were looked at, gather with the rest of their directions: the noise of one counts as much as what is seen of it.
     fn see<A: Accel>(
         &mut self,
         world: World<A>,
@@ -249,9 +254,11 @@ impl SurfaceMesh {
             .collect();
         looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
         let mut rest = Gathered::default();
-        for (crowd, of) in [(0..=CROWD, 1), (CROWD + 1..=2 * CROWD, 2)] {
+        let well_seen = WELL_SEEN * least_pixels(self.view.height).powi(2);
+        for (seen, of) in [(well_seen..f32::INFINITY, 1), (0.5 * well_seen..well_seen, 2)] {
             let mut numbers = Vec::new();
-            for sight in sights.iter_mut().filter(|sight| crowd.contains(&self.points.crowd(sight.number))) {
+            let stands_for = |number: u32| self.states[number as usize].stands_for as f32;
+            for sight in sights.iter_mut().filter(|sight| seen.contains(&stands_for(sight.number))) {
                 sight.rest = Some(rest.points.len() + numbers.len());
                 numbers.push(sight.number);
             }
@@ -304,7 +311,8 @@ impl SurfaceMesh {
     fn limits(&self, position: Vec3) -> (f32, f32) {
         let SurfaceView { footprint, height } = self.view;
         let pixel = footprint.edge * position.distance(footprint.eye);
-        (MOST_PIXELS.max(MOST_OF_HEIGHT * height as f32) * pixel, LEAST_PIXELS * pixel)
+        let least = least_pixels(height) * pixel;
+        (MOST_PER_LEAST * least, least)
     }
 
     /// The level of the first cell to look into for a record.
@@ -388,6 +396,11 @@ impl SurfaceMesh {
             + self.list_of.capacity() * size_of::<Range<u32>>()
             + (self.lists.capacity() + self.records.capacity()) * size_of::<u32>()
     }
+}
+
+/// Pixels along the narrowest cell of a record in a picture of so many rows.
+fn least_pixels(height: u32) -> f32 {
+    LEAST_PIXELS.max(LEAST_OF_HEIGHT * height as f32)
 }
 
 /// Working memory and counters of one thread.
