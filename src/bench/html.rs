@@ -192,6 +192,7 @@ mod tests {
             goals: Vec::new(),
             tables: vec![Table::new("t & u", &["a"])],
             bars: Vec::new(),
+            curves: Vec::new(),
             results: None,
             plots: vec![plot(vec![(1.0, 2.0), (10.0, 0.5)]), plot(Vec::new()), plot(vec![(0.0, f64::NAN)])],
         };

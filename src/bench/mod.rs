@@ -9,8 +9,10 @@ mod configuration;
 mod curve;
 mod headline;
 mod html;
+mod indirect;
 mod machine;
 mod markup;
+mod opened;
 mod rays;
 mod report;
 mod scaling;
@@ -49,6 +51,8 @@ named_enum! {
         Rays = "rays",
         /// Given scenes by light mesh and by conventional tracing, and which of them `auto` takes
         Scenes = "scenes",
+        /// Light from surfaces in given scenes: time, rays and error over the number of directions
+        Indirect = "indirect",
     }
 }
 
@@ -65,9 +69,9 @@ pub struct BenchOptions {
     pub backend: BackendChoice,
     /// The program to measure whole processes with; without it these measurements are left out.
     pub program: Option<PathBuf>,
-    /// With [`Benchmark::Scenes`]: scene files, models, and folders of them.
+    /// With [`Benchmark::Scenes`] and [`Benchmark::Indirect`]: scene files, models, and folders of them.
     pub scenes: Vec<PathBuf>,
-    /// With [`Benchmark::Scenes`]: size of the images instead of each scene's own.
+    /// With the same: size of the images instead of each scene's own.
     pub resolution: Option<(u32, u32)>,
 }
 
@@ -138,5 +142,6 @@ pub fn run(benchmark: Benchmark, options: &BenchOptions, log: &dyn Fn(&str)) -> 
         Benchmark::Backends => backends::run(options, log),
         Benchmark::Rays => rays::run(options, log),
         Benchmark::Scenes => scenes::run(options, log),
+        Benchmark::Indirect => indirect::run(options, log),
     }
 }

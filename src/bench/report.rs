@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::bars::BarPlot;
+use super::indirect::IndirectCurve;
 use super::machine::Machine;
 use super::scenes::SceneResults;
 use super::timing::Samples;
@@ -36,6 +37,9 @@ pub struct Report {
     /// Bars for people.
     #[serde(skip)]
     pub bars: Vec<BarPlot>,
+    /// What was found about light from surfaces.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curves: Vec<IndirectCurve>,
     /// What was found about given scenes; its fields are the report's own.
     #[serde(flatten)]
     pub results: Option<SceneResults>,

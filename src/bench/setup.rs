@@ -92,6 +92,7 @@ pub fn new_report(benchmark: &'static str, backend: String, options: &BenchOptio
         tables: Vec::new(),
         plots: Vec::new(),
         bars: Vec::new(),
+        curves: Vec::new(),
         results: None,
     }
 }

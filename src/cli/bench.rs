@@ -19,10 +19,10 @@ pub struct BenchArgs {
     /// What to measure
     #[arg(default_value_t, value_parser = named::<Benchmark>())]
     benchmark: Benchmark,
-    /// With `scenes`: scene files, models, and folders, which stand for all scenes in them [default: scenes]
+    /// With `scenes` and `indirect`: scene files, models, and folders, which stand for all scenes in them [default: scenes]
     #[arg(value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// With `scenes`: size of the images instead of each scene's own
+    /// With the same: size of the images instead of each scene's own
     #[arg(long, value_name = "WxH", value_parser = parse::resolution)]
     resolution: Option<(u32, u32)>,
     /// Write raw times and goals as JSON
@@ -54,12 +54,12 @@ const SCENES: &str = "scenes";
 impl BenchArgs {
     /// Refuses scenes for a benchmark that makes its own.
     pub fn check(&self) -> Result<(), String> {
-        let takes_scenes = self.benchmark == Benchmark::Scenes;
+        let takes_scenes = matches!(self.benchmark, Benchmark::Scenes | Benchmark::Indirect);
         if takes_scenes || self.scenes.is_empty() && self.resolution.is_none() {
             return Ok(());
         }
         Err(format!(
-            "`bench {}` makes its own scenes; only `bench scenes` takes some, and --resolution",
+            "`bench {}` makes its own scenes; only `bench scenes` and `bench indirect` take some, and --resolution",
             self.benchmark
         ))
     }

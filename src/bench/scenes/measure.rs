@@ -3,21 +3,16 @@
 use std::path::Path;
 
 use super::result::{SceneResult, Ways, judge};
-use crate::accel::Backend;
+use crate::bench::opened::Opened;
 use crate::bench::report::Report;
 use crate::bench::setup::Setup;
-use crate::bench::timing::{Samples, timed};
+use crate::bench::timing::Samples;
 use crate::bench::{BenchError, BenchOptions};
-use crate::framing::choose_view;
 use crate::image::Image;
 use crate::image::metrics::{MetricsOptions, compare};
 use crate::image::tone::auto_exposure;
-use crate::render::{RenderStats, SessionError, StageSeconds};
-use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
+use crate::render::{RenderStats, StageSeconds};
 use crate::settings::{IndirectForm, Integrator, Settings};
-
-/// The longer side of images of a quick run, pixels.
-const QUICK_SIDE: u32 = 32;
 
 /// What is kept of a frame.
 struct Run {
@@ -25,64 +20,35 @@ struct Run {
     seconds: f64,
 }
 
-/// A scene as `lightmesh render` would render it, with its acceleration structure.
-struct Opened {
-    setup: Setup,
-    backend: Backend,
-    build_seconds: f64,
-    /// Whether nobody stated an exposure.
-    bare: bool,
-}
-
-impl Opened {
-    fn new(file: &Path, options: &BenchOptions) -> Result<Self, BenchError> {
-        let (load_seconds, opened) = timed(|| open_scene(file));
-        let mut opened = opened?;
-        let resolution = &mut opened.loaded.settings.view.resolution;
-        *resolution = options.resolution.unwrap_or(*resolution);
-        if options.quick {
-            *resolution = within(*resolution, QUICK_SIDE);
-        }
-        opened.loaded.scene.validate().map_err(SessionError::from)?;
-        let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
-        let backend = built?.backend;
-        let OpenedScene { loaded, bare, .. } = choose_view(&opened, &backend).complete(opened);
-        let LoadedScene { scene, cameras, mut settings, .. } = loaded;
-        // Ways to direct light are compared; light from points on surfaces goes with either.
-        settings.mesh.indirect.take_if(|indirect| indirect.form == IndirectForm::Surface);
-        if scene.lights.is_empty() {
-            return Err(BenchError::NoLights);
-        }
-        let camera = cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
-        let setup = Setup { scene, camera, settings, load_seconds };
-        Ok(Self { setup, backend, build_seconds, bare })
-    }
-
-    /// A frame by one way; light meshes start empty.
-    fn frame(&self, integrator: Integrator) -> Result<(Image, Run), BenchError> {
-        let mut settings: Settings = self.setup.settings.clone();
-        settings.shading.integrator = integrator;
-        let frame = self.setup.frame(&self.backend, &settings)?;
-        Ok((frame.image, Run { stats: frame.stats, seconds: frame.seconds }))
-    }
+/// A frame by one way; light meshes start empty.
+fn frame(opened: &Opened, integrator: Integrator) -> Result<(Image, Run), BenchError> {
+    let mut settings: Settings = opened.setup.settings.clone();
+    settings.shading.integrator = integrator;
+    let frame = opened.setup.frame(&opened.backend, &settings)?;
+    Ok((frame.image, Run { stats: frame.stats, seconds: frame.seconds }))
 }
 
 /// Measures a scene; raw times go to the report.
 pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Result<SceneResult, BenchError> {
-    let opened = Opened::new(file, options)?;
+    let mut opened = Opened::new(file, options)?;
+    // Ways to direct light are compared; light from points on surfaces goes with either.
+    opened.setup.settings.mesh.indirect.take_if(|indirect| indirect.form == IndirectForm::Surface);
+    if opened.setup.scene.lights.is_empty() {
+        return Err(BenchError::NoLights);
+    }
     let name = file.display().to_string();
 
     // Pages and caches are warm for both ways. The image is as good as any later one: they are the same to the bit.
-    let (image, _) = opened.frame(Integrator::LightMesh)?;
+    let (image, _) = frame(&opened, Integrator::LightMesh)?;
     let mut reference = None;
     let runs = options.budget().alternate(2, |variant| {
-        let (rendered, run) = opened.frame([Integrator::LightMesh, Integrator::Conventional][variant])?;
+        let (rendered, run) = frame(&opened, [Integrator::LightMesh, Integrator::Conventional][variant])?;
         if variant == 1 {
             reference = Some(rendered);
         }
         Ok::<_, BenchError>(run)
     })?;
-    let (_, auto) = opened.frame(Integrator::Auto)?;
+    let (_, auto) = frame(&opened, Integrator::Auto)?;
 
     let [mesh_runs, conventional_runs] = [&runs[0], &runs[1]];
     let mut record = |way: Integrator, runs: &[Run]| {
@@ -168,25 +134,5 @@ fn stage_medians(runs: &[Run]) -> StageSeconds {
         paths: median(|seconds| seconds.paths),
         mesh: median(|seconds| seconds.mesh),
         shade: median(|seconds| seconds.shade),
-    }
-}
-
-/// A size of the same shape whose longer side is at most `most`.
-fn within((width, height): (u32, u32), most: u32) -> (u32, u32) {
-    let longer = width.max(height).max(most);
-    let scaled = |side: u32| (u64::from(side) * u64::from(most) / u64::from(longer)).max(1) as u32;
-    (scaled(width), scaled(height))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Quick images keep their shape, are never empty and never enlarged.
-    #[test]
-    fn quick_images_are_small() {
-        assert_eq!(within((800, 600), 32), (32, 24));
-        assert_eq!(within((4000, 1), 32), (32, 1));
-        assert_eq!(within((8, 20), 32), (8, 20));
     }
 }

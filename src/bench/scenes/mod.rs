@@ -6,5 +6,6 @@ mod result;
 mod run;
 mod show;
 
-pub use result::SceneResults;
+pub use find::scene_files;
+pub use result::{Failure, SceneResults};
 pub use run::run;

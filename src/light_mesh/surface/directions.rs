@@ -103,10 +103,12 @@ mod tests {
         let directions = HemisphereDirections::new(256);
         for set in &directions.sets {
             for count in [32, 64, 128, 256] {
+                // Far less than the 1/√N of random ones.
+                let most = 0.25 / (count as f32).sqrt();
                 let mean = set[..count].iter().sum::<Vec3>() / count as f32;
-                assert!(mean.abs_diff_eq(Vec3::Z * 2.0 / 3.0, 0.03), "{mean}");
+                assert!(mean.abs_diff_eq(Vec3::Z * 2.0 / 3.0, most), "{mean}");
                 let square = set[..count].iter().map(|d| d.z * d.z).sum::<f32>() / count as f32;
-                assert!((square - 0.5).abs() < 0.02, "{square}");
+                assert!((square - 0.5).abs() < most, "{square}");
             }
         }
     }

@@ -81,8 +81,9 @@ const MOST_PER_LEAST: f32 = 2.0;
 const LOOK: u32 = 4;
 /// Cells with more points, such as those full of leaves, are not made smaller for what is near: there is no end to it.
 const CROWD: u32 = 12;
-/// Records that stand for less of the view than that part of a square of the least width gather with half of the directions, with less than
-/// half of it with a quarter.
+/// In cells with more points, records gather with half of the directions that stand for less of the view than that part of a square of the
+/// least width, and with a quarter that stand for less than half of it. Elsewhere, what another view sees more of would show.
+const FEW: u32 = 4;
 const WELL_SEEN: f32 = 0.25;
 /// Width of cells, per distance along a ray, whose mean light will do.
 const FINENESS: f32 = 0.5;
@@ -255,10 +256,19 @@ impl SurfaceMesh {
         looked.points.iter().for_each(|&number| self.states[number as usize].looked_at = 0);
         let mut rest = Gathered::default();
         let well_seen = WELL_SEEN * least_pixels(self.view.height).powi(2);
-        for (seen, of) in [(well_seen..f32::INFINITY, 1), (0.5 * well_seen..well_seen, 2)] {
+        let share = |number: u32| {
+            let (state, few) = (&self.states[number as usize], self.points.crowd(number) <= FEW);
+            match state.stands_for as f32 / well_seen {
+                _ if few => 1,
+                1.0.. => 1,
+                0.5.. => 2,
+                _ => LOOK,
+            }
+        };
+        let shares: Vec<u32> = sights.iter().map(|sight| share(sight.number)).collect();
+        for of in [1, 2] {
             let mut numbers = Vec::new();
-            let stands_for = |number: u32| self.states[number as usize].stands_for as f32;
-            for sight in sights.iter_mut().filter(|sight| seen.contains(&stands_for(sight.number))) {
+            for (sight, _) in sights.iter_mut().zip(&shares).filter(|(_, share)| **share == of) {
                 sight.rest = Some(rest.points.len() + numbers.len());
                 numbers.push(sight.number);
             }

@@ -1,0 +1,67 @@
+//! Scenes that are named on the command line.
+
+use std::path::Path;
+
+use super::setup::Setup;
+use super::timing::timed;
+use super::{BenchError, BenchOptions};
+use crate::accel::Backend;
+use crate::framing::choose_view;
+use crate::render::SessionError;
+use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
+
+/// The longer side of images of a quick run, pixels.
+const QUICK_SIDE: u32 = 32;
+
+/// A scene as `lightmesh render` would render it, with its acceleration structure.
+pub struct Opened {
+    /// The scene.
+    pub setup: Setup,
+    /// Its acceleration structure.
+    pub backend: Backend,
+    /// Seconds to build it.
+    pub build_seconds: f64,
+    /// Whether nobody stated an exposure.
+    pub bare: bool,
+}
+
+impl Opened {
+    /// Reads a scene file or model, and builds the acceleration structure.
+    pub fn new(file: &Path, options: &BenchOptions) -> Result<Self, BenchError> {
+        let (load_seconds, opened) = timed(|| open_scene(file));
+        let mut opened = opened?;
+        let resolution = &mut opened.loaded.settings.view.resolution;
+        *resolution = options.resolution.unwrap_or(*resolution);
+        if options.quick {
+            *resolution = within(*resolution, QUICK_SIDE);
+        }
+        opened.loaded.scene.validate().map_err(SessionError::from)?;
+        let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
+        let backend = built?.backend;
+        let OpenedScene { loaded, bare, .. } = choose_view(&opened, &backend).complete(opened);
+        let LoadedScene { scene, cameras, settings, .. } = loaded;
+        let camera = cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
+        let setup = Setup { scene, camera, settings, load_seconds };
+        Ok(Self { setup, backend, build_seconds, bare })
+    }
+}
+
+/// A size of the same shape whose longer side is at most `most`.
+fn within((width, height): (u32, u32), most: u32) -> (u32, u32) {
+    let longer = width.max(height).max(most);
+    let scaled = |side: u32| (u64::from(side) * u64::from(most) / u64::from(longer)).max(1) as u32;
+    (scaled(width), scaled(height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quick images keep their shape, are never empty and never enlarged.
+    #[test]
+    fn quick_images_are_small() {
+        assert_eq!(within((800, 600), 32), (32, 24));
+        assert_eq!(within((4000, 1), 32), (32, 1));
+        assert_eq!(within((8, 20), 32), (8, 20));
+    }
+}
