@@ -177,6 +177,39 @@ fn scenes_compares_both_ways_and_the_choice_between_them() {
     assert_eq!(result.2.matches("<svg").count(), 2, "ratios and stages are plotted");
 }
 
+/// By number of directions, what light from surfaces costs and how far it is off; a scene that can't be read is named.
+#[test]
+fn indirect_measures_light_from_surfaces() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("model.obj"), MODEL).expect("writable");
+    fs::write(folder.path().join("scene.toml"), SCENE.to_owned() + LIGHT).expect("writable");
+    let path = folder.path().to_str().expect("UTF-8");
+    let result = bench_unless_failed(folder.path(), &["indirect", path, "missing.glb"]);
+    check_form("indirect", &result);
+    assert_eq!(result.0.status.code(), Some(1));
+    assert!(result.1["failures"][0]["name"].as_str().is_some_and(|file| file.ends_with("missing.glb")));
+    let curves = result.1["curves"].as_array().expect("a list");
+    let names: Vec<&str> = curves.iter().filter_map(|curve| curve["name"].as_str()).collect();
+    assert_eq!(names, [format!("{path}/model.obj"), format!("{path}/scene.toml")]);
+    for curve in curves {
+        assert!(curve["direct_seconds"].is_number() && curve["reference_directions"].as_u64() >= Some(1));
+        let points = curve["points"].as_array().expect("a list");
+        let number = |key: &str| -> Vec<u64> {
+            points.iter().filter_map(|point| point.pointer(key)).filter_map(Value::as_u64).collect()
+        };
+        let (directions, rays) = (number("/directions"), number("/rays/indirect"));
+        assert_eq!((directions.len(), rays.len()), (4, 4));
+        assert!(directions.is_sorted() && rays.is_sorted() && rays[0] > 0, "{directions:?}: {rays:?}");
+        for point in points {
+            assert!(point["seconds"].is_number() && point["stages"]["mesh"].is_number());
+            assert!(point["flip"].is_number() || point["flip"].is_null());
+        }
+    }
+    assert!(
+        String::from_utf8_lossy(&result.0.stdout).contains("Light from surfaces by number of directions")
+    );
+}
+
 /// A scene that can't be measured is named in every output and in the error at the end, and the others are there.
 #[test]
 fn a_scene_that_cannot_be_measured_takes_nothing_from_the_others() {
@@ -218,7 +251,7 @@ fn a_scene_that_cannot_be_measured_takes_nothing_from_the_others() {
 
 /// Scenes for a benchmark that makes its own are wrong usage, rather than left out.
 #[test]
-fn only_one_benchmark_takes_scenes() {
+fn benchmarks_that_make_their_scenes_take_none() {
     for arguments in [&["bench", "rays", "a.toml"][..], &["bench", "--resolution", "8x8"]] {
         let output =
             Command::new(env!("CARGO_BIN_EXE_lightmesh")).args(arguments).output().expect("the program runs");

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use lightmesh::image;
 use serde_json::{Value, json};
 
 const MODEL: &str = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
@@ -93,6 +94,32 @@ fn what_only_a_light_mesh_gives_is_never_traced_away() {
             check_choice(&stats, &notes);
             let expected = json!({ "integrator": "light-mesh", "reason": "settings" });
             assert_eq!(stats["choice"], expected, "{table} {flags:?}");
+        }
+    }
+}
+
+/// A floor and a wall beside it, both white.
+const CORNER: &str = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 2 -1\nv 1 2 -1\nf 1 4 3 2\nf 1 2 6 5\n";
+
+/// Light that surfaces send each other belongs to a bare model, is the same whatever computes the direct light, and can be left out.
+#[test]
+fn light_from_surfaces_goes_with_every_integrator() {
+    let folder = folder(SCENE);
+    fs::write(folder.path().join("corner.obj"), CORNER).expect("writable");
+    let image = |flags: &[&str]| {
+        let flags = [&["--resolution", "32x24", "--float"], flags].concat();
+        render(folder.path(), "corner.obj", &flags);
+        image::read(&folder.path().join("out.exr")).expect("an image").pixels().to_vec()
+    };
+    let added = |integrator: &[&str]| -> Vec<f32> {
+        let (with, without) = (image(integrator), image(&[integrator, &["--indirect", "off"]].concat()));
+        with.iter().zip(&without).map(|(with, without)| (*with - *without).element_sum()).collect()
+    };
+    let by_default = added(&[]);
+    assert!(by_default.iter().sum::<f32>() > 0.0, "the corner lights itself");
+    for integrator in ["light-mesh", "conventional"] {
+        for (found, expected) in added(&["--integrator", integrator]).iter().zip(&by_default) {
+            assert!((found - expected).abs() < 1e-4, "{integrator}: {found} instead of {expected}");
         }
     }
 }

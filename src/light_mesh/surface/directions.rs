@@ -9,7 +9,7 @@ use crate::scene::SurfacePoint;
 /// Sets of directions. Those of neighbouring points complete each other: together they are a longer stretch of the same sequence.
 const SETS: usize = 16;
 
-/// Sets of directions around the z axis. The first eighth, quarter and half of each are spread as evenly as all are.
+/// Sets of directions around the z axis. The first half of each, quarter and so on are spread as evenly as all are.
 pub struct HemisphereDirections {
     sets: Vec<Vec<Vec3>>,
 }
@@ -27,7 +27,7 @@ impl HemisphereDirections {
                 .collect();
             // Rays that go about the same way travel together.
             let mut first = 0;
-            for share in [8, 4, 2, 1] {
+            for share in [32, 16, 8, 4, 2, 1] {
                 let end = part(count, share) as usize;
                 set[first..end].sort_by_key(|&(order, _)| order);
                 first = end;

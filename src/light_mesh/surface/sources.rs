@@ -79,13 +79,19 @@ impl SurfaceMesh {
         }
         while let Some(chosen) = self.choose(&mut importance) {
             let mean = chosen.iter().map(|(_, amount)| amount).sum::<f32>() / chosen.len() as f32;
+            // Where each record has many, they need not know each light so well.
+            let many = match chosen.len() / sight.records.len().max(1) {
+                0..4 => 1,
+                4..16 => 2,
+                _ => 4,
+            };
             // The noise of a source counts as much as its light does.
             let share = |amount: f32| match amount / mean {
-                ..0.25 => 8,
-                ..1.0 => 4,
-                _ => 2,
+                ..0.25 => 8 * many,
+                ..1.0 => 4 * many,
+                _ => 2 * many,
             };
-            for of in [2, 4, 8] {
+            for of in [2 * many, 4 * many, 8 * many] {
                 let (numbers, amounts): (Vec<u32>, Vec<f32>) =
                     chosen.iter().filter(|(_, amount)| share(*amount) == of).copied().unzip();
                 let count = part(self.settings.directions, of);

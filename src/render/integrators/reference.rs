@@ -21,7 +21,7 @@ use crate::world::World;
 /// The field is evaluated afresh at [`ShadingSettings::reference_samples`] positions around every surface point: a
 /// low-discrepancy sequence, shifted by a hash of the surface point's position, so that images don't depend on
 /// the order of evaluation and the remaining error is noise and not a pattern. Estimators and leak rules are the light mesh's.
-/// Direct light only.
+/// Direct light only; light from points on surfaces is added to it as to any other.
 pub struct ReferenceIntegrator<'a, A> {
     world: World<'a, A>,
     shading: &'a ShadingSettings,
