@@ -113,7 +113,10 @@ fn light_from_surfaces_goes_with_every_integrator() {
     };
     let added = |integrator: &[&str]| -> Vec<f32> {
         let (with, without) = (image(integrator), image(&[integrator, &["--indirect", "off"]].concat()));
-        with.iter().zip(&without).map(|(with, without)| (*with - *without).element_sum()).collect()
+        with.iter()
+            .zip(&without)
+            .map(|(with, without)| with.iter().sum::<f32>() - without.iter().sum::<f32>())
+            .collect()
     };
     let by_default = added(&[]);
     assert!(by_default.iter().sum::<f32>() > 0.0, "the corner lights itself");

@@ -115,7 +115,8 @@ pub struct CellPoint {
     pub surface: SurfacePoint,
     /// Places spread over what it stands for.
     pub spread: [Vec3; 4],
-    /// Whether other points of the cell lie in about the same plane and are not seen by it.
+    /// Whether it may not be seen from all of the surface in the cell: other points lie in about the same plane and are not seen by it, or
+    /// something stands on it.
     pub divided: bool,
 }
 
@@ -206,11 +207,22 @@ pub fn survey<A: Accel>(accel: &A, scene: &Scene, cells: &Cells, cell: Cell) -> 
             }
         }
     }
+    let all: Vec<SurfacePoint> = surfaces.iter().flatten().copied().collect();
     let mut points = Vec::with_capacity(surfaces.len());
     for surface in surfaces {
         rays += divide(accel, surface, width, &mut points);
     }
+    for point in &mut points {
+        point.divided |= all.iter().any(|other| stands_on(other, &point.surface, width));
+    }
     (points, rays)
+}
+
+/// Whether a surface point belongs to something that rises above another one: a sliver of floor beside a block, which no line may have met, is
+/// not for the point below the block to stand for.
+fn stands_on(other: &SurfacePoint, point: &SurfacePoint, width: f32) -> bool {
+    let height = (other.position - point.position).dot(point.geometric_normal);
+    height > LAYER * width && other.geometric_normal.dot(point.geometric_normal).abs() < SAME_WAY
 }
 
 /// Adds points for one surface, several if they don't see each other; returns the number of rays.
@@ -330,6 +342,17 @@ mod tests {
             upper.iter().map(|point| (point.surface.position.x - middle().x).signum()).collect();
         assert!(sides.contains(&1.0) && sides.contains(&-1.0), "{sides:?}");
         assert!(upper.iter().all(|point| point.divided));
+    }
+
+    /// A block covers all of the floor that lines meet: what else there is of the floor has to ask.
+    #[test]
+    fn a_sliver_beside_a_block_asks() {
+        let side = (Vec3::new(middle().x + 0.4, 0.3, 0.0), 0.3 * Vec3::Y, 3.0 * Vec3::Z);
+        let points = points(&[FLOOR, side]);
+        let mut upper = points.iter().filter(|point| point.surface.shading_normal == Vec3::Y);
+        assert!(upper.all(|point| point.divided));
+        let below = points.iter().find(|point| point.surface.shading_normal == Vec3::NEG_Y);
+        assert!(below.is_some_and(|point| !point.divided), "nothing stands on the underside");
     }
 
     /// Two floors above each other need no question: the plane tells.

@@ -18,6 +18,9 @@ const ALIKE: f32 = 0.5;
 /// their noise.
 const STIFFNESS: f32 = 0.006;
 
+/// How far beyond the points' light that of the plane may lie, as a part of the range of theirs: on a ledge a few points have a steep plane.
+const BEYOND: f32 = 0.25;
+
 /// Those of some points around a point that it sees and that face about the same way, itself first. Returns the number of rays.
 pub fn neighbours<A: Accel>(
     accel: &A,
@@ -88,6 +91,7 @@ fn fit<'s>(
     let mut place = Vec2::ZERO;
     let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
     let (mut sum, mut along_u, mut along_v) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    let (mut least, mut most) = (Vec3::INFINITY, Vec3::ZERO);
     for (point, value) in points {
         let way = point.position - surface.position;
         let height = way.dot(normal);
@@ -106,6 +110,7 @@ fn fit<'s>(
         sum += weight * value;
         along_u += weight * at.x * value;
         along_v += weight * at.y * value;
+        (least, most) = (least.min(value), most.max(value));
     }
     if total <= 1e-6 {
         return None;
@@ -122,7 +127,10 @@ fn fit<'s>(
     let determinant = uu * vv - uv * uv;
     let slope_u = (along_u * vv - along_v * uv) / determinant;
     let slope_v = (along_v * uu - along_u * uv) / determinant;
-    Some((mean - slope_u * place.x - slope_v * place.y).max(Vec3::ZERO))
+    let beyond = BEYOND * (most - least);
+    let value = mean - slope_u * place.x - slope_v * place.y;
+    // The order of the bounds holds for any numbers.
+    Some(value.max((least - beyond).max(Vec3::ZERO)).min(most + beyond))
 }
 
 #[cfg(test)]
@@ -148,6 +156,22 @@ mod tests {
         for x in [-3.2, -1.0, -0.5, -0.1] {
             assert!(at(&even, x).abs_diff_eq(Vec3::splat(0.3), 1e-5));
             assert!((at(&steady, x).x - 8.0 - x).abs() < 0.12, "{} at {x}", at(&steady, x));
+        }
+    }
+
+    /// Three points on a narrow ledge, of which one is dark, make no plane that is black a step further on.
+    #[test]
+    fn few_points_make_no_steep_plane() {
+        let light = [0.5, 0.45, 0.2];
+        let points: Vec<(SurfacePoint, Vec3)> = (0..3)
+            .map(|i| {
+                let place = Vec3::new(0.5 * i as f32, 0.0, 0.03 * i as f32);
+                (SurfacePoint::flat(place, Vec3::Y), Vec3::splat(light[i]))
+            })
+            .collect();
+        for x in [-1.0, 1.5, 1.9] {
+            let found = at(&points, x).x;
+            assert!((0.12..=0.58).contains(&found), "{found} at {x}");
         }
     }
 
