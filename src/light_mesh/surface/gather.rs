@@ -9,7 +9,9 @@ use rayon::prelude::*;
 
 use super::cells::{Cell, line_between};
 use super::directions::HemisphereDirections;
-use super::points::{LastPlace, NO_POINT, SurfacePoints};
+use super::gathered::{Gathered, GatheredRay};
+use super::last_place::LastPlace;
+use super::points::{NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 use crate::light_mesh::direct_light::{Candidate, DirectLight};
 use crate::light_mesh::packed_colour::PackedColour;
@@ -26,70 +28,6 @@ const POINTS_PER_BATCH: usize = 1024;
 const POINTS_PER_TASK: usize = 16;
 /// Light in a cell is uneven where it differs by more than this part of its mean.
 const UNEVEN: f32 = 0.5;
-
-/// What a ray found.
-#[derive(Clone, Copy, Debug)]
-pub struct GatheredRay {
-    /// Number of the point of level 0 that stands for the surface that it found, or [`NO_POINT`].
-    pub point: u32,
-    diffuse: PackedColour,
-}
-
-impl GatheredRay {
-    const NOTHING: Self = Self { point: NO_POINT, diffuse: PackedColour::BLACK };
-
-    /// Adds how much of the light at the point that stands for where it ended it brings along, times a weight, to what is known by point.
-    #[inline(always)]
-    pub fn add_to(self, amounts: &mut [f32], weight: f32) {
-        if let Some(amount) = amounts.get_mut(self.point as usize) {
-            *amount += self.diffuse().element_sum() / 3.0 * weight;
-        }
-    }
-
-    /// k_d where the ray ended.
-    #[inline(always)]
-    pub fn diffuse(self) -> Vec3 {
-        self.diffuse.colour()
-    }
-}
-
-/// What some points see.
-#[derive(Default)]
-pub struct Gathered {
-    /// Numbers of the points.
-    pub points: Vec<u32>,
-    /// Sum over a point's rays of the light that needs nothing that other points gather: of emitters, of the background, and of lights over
-    /// one reflection.
-    pub emitted: Vec<Vec3>,
-    /// What light from other points is multiplied by, for rays that end where none stands for the surface.
-    pub shares: Vec<f32>,
-    /// Sum over a point's rays of 1/t.
-    pub closeness: Vec<f32>,
-    /// The rays of each point end here.
-    ends: Vec<usize>,
-    /// Rays, point by point.
-    pub rays: Vec<GatheredRay>,
-}
-
-impl Gathered {
-    /// The rays of the point of an index, none if it has none.
-    #[inline(always)]
-    pub fn rays_of(&self, index: usize) -> &[GatheredRay] {
-        let end = |index: usize| self.ends.get(index).copied().unwrap_or_default();
-        self.rays.get(index.checked_sub(1).map_or(0, end)..end(index)).unwrap_or_default()
-    }
-
-    /// Adds what other points see.
-    pub fn append(&mut self, mut other: Self) {
-        self.points.append(&mut other.points);
-        self.emitted.append(&mut other.emitted);
-        self.closeness.append(&mut other.closeness);
-        self.shares.append(&mut other.shares);
-        let first = self.rays.len();
-        self.ends.extend(other.ends.into_iter().map(|end| first + end));
-        self.rays.append(&mut other.rays);
-    }
-}
 
 /// What is gathered: how, and with which rays.
 pub struct Gather<'a, A> {

@@ -4,10 +4,13 @@ mod cell_light;
 mod cells;
 mod directions;
 mod gather;
+mod gathered;
 mod interpolate;
+mod last_place;
 mod mesh;
 mod pixels;
 mod points;
+mod records;
 mod solve;
 mod sources;
 

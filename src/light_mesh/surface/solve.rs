@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::gather::Gathered;
+use super::gathered::Gathered;
 use crate::light_mesh::series::Series;
 
 impl Gathered {

@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::directions::part;
-use super::gather::{Gathered, GatheredRay};
+use super::gathered::{Gathered, GatheredRay};
 use super::mesh::{SurfaceEvaluation, SurfaceMesh};
 use crate::accel::Accel;
 use crate::world::World;
