@@ -12,8 +12,8 @@ use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::Tile;
 use super::trace::{PathVertex, TilePaths, pixel_groups};
 use crate::accel::Accel;
-use crate::light_mesh::surface::{PixelGroups, SurfaceMesh, SurfaceView};
-use crate::scene::Camera;
+use crate::light_mesh::surface::{PixelGroup, SurfaceMesh, SurfaceView};
+use crate::scene::{Camera, SurfacePoint};
 use crate::settings::{Normalization, Settings};
 use crate::simd::vectorize;
 
@@ -34,9 +34,11 @@ pub fn evaluate_surface_light<A: Accel>(
         let mut seconds = stats.seconds.mesh;
         timed(&mut seconds, || {
             let footprint = mesh.view().footprint;
-            let groups: Vec<PixelGroups> = paths.par_iter().map(|paths| paths.groups(&footprint)).collect();
-            let firsts = groups.iter().map(|groups| groups.groups.iter().map(|group| &group.first).collect());
-            stats.add_surface(mesh.need(world, firsts.collect()));
+            let middles = |paths: &TilePaths| -> Vec<SurfacePoint> {
+                paths.groups(&footprint).groups.iter().map(PixelGroup::middle).collect()
+            };
+            let middles: Vec<Vec<SurfacePoint>> = paths.par_iter().map(middles).collect();
+            stats.add_surface(mesh.need(world, middles.iter().map(|tile| tile.iter().collect()).collect()));
         });
         stats.seconds.mesh = seconds;
     })?;

@@ -240,13 +240,13 @@ impl SurfaceMesh {
         let values: Vec<Vec3> = groups
             .groups
             .iter()
-            .map(|group| match self.place(accel, &group.first, &mut scratch) {
-                Some(number) => {
-                    let list = self.list_of[number as usize].clone();
-                    let list = self.lists.get(list.start as usize..list.end as usize).unwrap_or_default();
-                    interpolate(&self.points, &group.middle(), list, &self.received)
-                }
-                None => Vec3::ZERO,
+            .map(|group| {
+                // A single point may lie in a crease, a rounding error below the surface beside it.
+                let middle = group.middle();
+                let Some(number) = self.place(accel, &middle, &mut scratch) else { return Vec3::ZERO };
+                let list = self.list_of[number as usize].clone();
+                let list = self.lists.get(list.start as usize..list.end as usize).unwrap_or_default();
+                interpolate(&self.points, &middle, list, &self.received)
             })
             .collect();
         for (light, &group) in light.iter_mut().zip(&groups.group_of) {

@@ -15,4 +15,4 @@ mod solve;
 mod sources;
 
 pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
-pub use pixels::PixelGroups;
+pub use pixels::{PixelGroup, PixelGroups};
