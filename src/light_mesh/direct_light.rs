@@ -64,8 +64,7 @@ impl DirectLight {
     ) -> (Vec3, f32) {
         self.unoccluded.clear();
         for surface in surfaces {
-            let amounts = &mut self.unoccluded;
-            lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+            self.add_unoccluded(lights, surface);
         }
         let count = lights.chunks().len() * LANES;
         self.row = count;
@@ -90,16 +89,11 @@ impl DirectLight {
         }
         let mut packet = RayPacket::<LANES>::empty();
         let mut active: LaneMask = 0;
-        let singular = lights.falloff() == Falloff::InverseSquare;
-        let near = if singular { width * width / (2.0 * PI) } else { 0.0 };
         for (lane, (light, factor)) in self.chosen.iter_mut().enumerate() {
             let origin = surfaces[*light / count].ray_origin();
             let chunk = &lights.chunks()[*light % count / LANES];
             let way = Vec3::from_array(chunk.to_light(*light % LANES, origin.to_array()));
-            let squared = way.length_squared();
-            if near > 0.0 && squared < 1e3 * near {
-                *factor *= squared / squared.hypot(near);
-            }
+            *factor *= of_square(lights, way.length_squared(), width);
             packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
             active |= 1 << lane;
         }
@@ -123,6 +117,12 @@ impl DirectLight {
         (sum / count, unevenness)
     }
 
+    #[inline(always)]
+    fn add_unoccluded(&mut self, lights: &PackedLights, surface: &SurfacePoint) {
+        let amounts = &mut self.unoccluded;
+        lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+    }
+
     /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface. `None` if none lies
     /// above its horizon.
     #[inline(always)]
@@ -133,8 +133,7 @@ impl DirectLight {
         number: f32,
     ) -> Option<Candidate> {
         self.unoccluded.clear();
-        let amounts = &mut self.unoccluded;
-        lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+        self.add_unoccluded(lights, surface);
         let sum = self.unoccluded.iter().sum::<f32>();
         let mut left = number * sum;
         let chosen = self.unoccluded.iter().position(|&amount| {
@@ -152,6 +151,19 @@ impl DirectLight {
     pub fn amounts(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         let amount = |light: usize| self.unoccluded.iter().skip(light).step_by(self.row).sum::<f32>();
         (0..self.row).map(move |light| (light as u32, amount(light))).filter(|(_, amount)| *amount > 0.0)
+    }
+}
+
+/// What a square of the given width gets on average of what a single point gets from a light at a distance, given squared (see
+/// [`DirectLight::at`]).
+#[inline(always)]
+pub fn of_square(lights: &PackedLights, squared: f32, width: f32) -> f32 {
+    let near = width * width / (2.0 * PI);
+    // Further away they are the same to a part in a million.
+    if lights.falloff() == Falloff::InverseSquare && squared < 1e3 * near {
+        squared / squared.hypot(near)
+    } else {
+        1.0
     }
 }
 
@@ -227,6 +239,25 @@ mod tests {
         }
         assert!(direct.rays <= 2000 * 16);
         assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found} for {expected}");
+    }
+
+    /// Without a cell's advice, too, one light at a time makes all the light.
+    #[test]
+    fn one_light_at_a_time_is_all_of_them() {
+        let lights = lights(60);
+        let surface = SurfacePoint::flat(Vec3::new(0.1, 0.0, 0.2), Vec3::Y);
+        let (mut direct, mut found, numbers) = (DirectLight::default(), Vec3::ZERO, 5000);
+        for number in 0..numbers {
+            let number = (number as f32 + 0.5) / numbers as f32;
+            let chosen = direct.choose(&lights, &surface, number).expect("lights above");
+            let (chunk, lane) = (chosen.light as usize / LANES, chosen.light as usize % LANES);
+            let intensity = Vec3::from_array(lights.intensity(chunk, lane));
+            found += intensity * lights.factor(chunk, lane, &surface) * chosen.weight / numbers as f32;
+        }
+        let expected = lights.irradiance(&surface, AllSeen);
+        assert!((found / expected - 1.0).abs().max_element() < 0.005, "{found} for {expected}");
+        let below = SurfacePoint::flat(Vec3::ZERO, Vec3::NEG_Y);
+        assert!(direct.choose(&lights, &below, 0.5).is_none());
     }
 
     /// At the foot of a lamp, low above the floor, a point gets what a disc around it gets on average: 2I/a² · (1 − h/√(h² + a²)), with

@@ -64,3 +64,47 @@ impl CellLight {
         chosen.map(|(candidate, _)| *candidate)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::BruteForceAccel;
+    use crate::lights::{EmissiveTriangles, PackedLights, Unoccluded};
+    use crate::scene::{Falloff, Light, Scene, SurfacePoint};
+
+    /// What a point of a floor gets by asking about one light for each of many even numbers, over what all lights give it, averaged over
+    /// some cells.
+    fn asked(count: usize) -> Vec3 {
+        let at = |i: usize| Vec3::new((i % 7) as f32 - 3.0, 1.0 + (i % 3) as f32, (i / 7) as f32 - 2.0);
+        let lamps: Vec<Light> =
+            (0..count).map(|i| Light::point(at(i), Vec3::new(1.0, 0.5, (i % 4) as f32 + 0.5))).collect();
+        let (scene, lights) = (Scene::default(), PackedLights::new(&lamps, Falloff::InverseSquare, 0.0));
+        let (accel, emissive) = (BruteForceAccel::new(&scene), EmissiveTriangles::of_scene(&scene));
+        let world = World { accel: &accel, scene: &scene, lights: &lights, emissive: &emissive };
+        let (cells, numbers) = (200, 500);
+        let mut sum = Vec3::ZERO;
+        for cell in 0..cells {
+            let middle = SurfacePoint::flat(Vec3::X * 1e-4 * cell as f32, Vec3::Y);
+            let light = CellLight::new(world, &CellPoint::alone(&middle), 0.0, &mut DirectLight::default());
+            let surface = SurfacePoint::flat(middle.position + Vec3::Z * 0.05, Vec3::Y);
+            let mut found = Vec3::ZERO;
+            for number in 0..numbers {
+                let chosen = light.choose((number as f32 + 0.5) / numbers as f32).expect("lights above");
+                let (chunk, lane) = (chosen.light as usize / LANES, chosen.light as usize % LANES);
+                let intensity = Vec3::from_array(lights.intensity(chunk, lane));
+                found += intensity * lights.factor(chunk, lane, &surface) * chosen.weight;
+            }
+            sum += found / numbers as f32 / lights.irradiance(&surface, Unoccluded);
+        }
+        sum / cells as f32
+    }
+
+    /// One light at a time makes all the light: exactly for up to 16 lights, on average over cells for more.
+    #[test]
+    fn one_light_at_a_time_is_all_of_them() {
+        for (count, most) in [(1, 0.005), (5, 0.005), (16, 0.005), (60, 0.02)] {
+            let share = asked(count);
+            assert!((share - 1.0).abs().max_element() < most, "{share} of the light of {count}");
+        }
+    }
+}

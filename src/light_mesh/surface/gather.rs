@@ -13,10 +13,10 @@ use super::gathered::{Gathered, GatheredRay};
 use super::last_place::LastPlace;
 use super::points::{NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
-use crate::light_mesh::direct_light::{Candidate, DirectLight};
+use crate::light_mesh::direct_light::{Candidate, DirectLight, of_square};
 use crate::light_mesh::packed_colour::PackedColour;
 use crate::sampling::hash_to_unit_cube;
-use crate::scene::{Falloff, Ray, SurfacePoint};
+use crate::scene::{Ray, SurfacePoint};
 use crate::simd::{LANES, vectorize};
 use crate::world::World;
 
@@ -101,7 +101,7 @@ impl<A: Accel> Gather<'_, A> {
         let shares: Vec<Vec<f32>> =
             parts.par_iter_mut().map(|part| vectorize(SettleTask { gather: self, points, part })).collect();
         for (part, unknown) in parts.iter().zip(shares) {
-            rays += part.rays + part.scratch.rays;
+            rays += part.rays;
             out.emitted.extend_from_slice(&part.emitted);
             out.closeness.extend_from_slice(&part.closeness);
             out.rays.extend_from_slice(&part.gathered);
@@ -118,7 +118,7 @@ impl<A: Accel> Gather<'_, A> {
         let mut nearest = [[NO_POINT; 2]; WIDTH];
         let mut known: LaneMask = 0;
         for (lane, arrival) in arrivals.iter().enumerate().take(WIDTH) {
-            match last.numbers(points, points.cells.at(0, arrival.surface.position)) {
+            match points.of_next_cell(points.cells.at(0, arrival.surface.position), last) {
                 Some(numbers) => {
                     nearest[lane] = points.nearest(numbers, width, &arrival.surface);
                     known |= 1 << lane;
@@ -156,7 +156,6 @@ impl<A: Accel> Gather<'_, A> {
         let mut packet = RayPacket::<WIDTH>::empty();
         let mut active: LaneMask = 0;
         let mut offered = [Vec3::ZERO; WIDTH];
-        let singular = lights.falloff() == Falloff::InverseSquare;
         for lane in lanes(known) {
             let Arrival { ray, surface, diffuse, distance, number } = &arrivals[lane];
             let ray = *ray as usize;
@@ -183,15 +182,14 @@ impl<A: Accel> Gather<'_, A> {
             }
             let origin = surface.ray_origin();
             let way = Vec3::from_array(lights.chunks()[chunk].to_light(index, origin.to_array()));
-            if singular {
-                // As for squares in `DirectLight::at`: a ray stands for a part of the surface.
-                let near = self.footprint(*distance).powi(2) / (2.0 * PI);
-                let squared = way.length_squared();
-                factor *= squared / squared.hypot(near);
-            }
-            packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
-            active |= 1 << lane;
+            // A ray stands for a part of the surface.
+            factor *= of_square(lights, way.length_squared(), self.footprint(*distance));
             offered[lane] = reflected * Vec3::from_array(lights.intensity(chunk, index)) * factor;
+            // What no number can hold, next to a light of enormous intensity, is left out.
+            if offered[lane].is_finite() {
+                packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
+                active |= 1 << lane;
+            }
         }
         part.rays += u64::from(active.count_ones());
         let blocked = accel.occluded_packet(active, &mut packet, Coherence::Incoherent);

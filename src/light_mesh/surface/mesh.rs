@@ -265,7 +265,7 @@ impl SurfaceMesh {
         let mut found = None;
         for level in self.first_level(surface)..=FINEST {
             let last = &mut scratch.last[usize::from(level)];
-            let place = last.find(&self.points, accel, level, surface, &mut scratch.rays);
+            let place = self.points.find(accel, last, level, surface, &mut scratch.rays);
             let place = place.or_else(|| self.points.find_near(accel, level, surface, &mut scratch.rays));
             found = place.or(found);
             if place.is_some_and(|number| !self.refined(number)) {

@@ -122,6 +122,12 @@ impl SurfacePoints {
         self.by_cell.get(&cell.key()).map(|&(first, count)| first..first + count)
     }
 
+    /// The same, given the cell that was looked into last.
+    #[inline(always)]
+    pub fn of_next_cell(&self, cell: Cell, last: &mut LastPlace) -> Option<Range<u32>> {
+        last.numbers(cell, |cell| self.of_cell(cell))
+    }
+
     /// Surveys those of the cells that were not; returns the number of rays.
     pub fn survey<A: Accel>(&mut self, world: World<A>, cells: impl Iterator<Item = Cell>) -> u64 {
         let mut seen = HashSet::<u64, BuildKeyHasher>::default();
@@ -160,7 +166,8 @@ impl SurfacePoints {
         let points = &*self;
         let find = |task: &Vec<&SurfacePoint>| {
             let (mut rays, mut last) = (0, LastPlace::default());
-            let find = |surface: &&SurfacePoint| last.find(points, world.accel, level, surface, &mut rays);
+            let find =
+                |surface: &&SurfacePoint| points.find(world.accel, &mut last, level, surface, &mut rays);
             (task.iter().map(find).collect::<Vec<Option<u32>>>(), rays)
         };
         let mut found: Vec<(Vec<Option<u32>>, u64)> = tasks.par_iter().map(find).collect();
@@ -266,22 +273,23 @@ impl SurfacePoints {
     /// The point in the cell of a surface point that stands for it: of those that face about the same way the nearest, which must be seen
     /// from it where a wall divides the cell. Counts rays.
     #[inline(always)]
-    pub fn find_in<A: Accel>(
+    pub fn find<A: Accel>(
         &self,
         accel: &A,
-        numbers: Range<u32>,
+        last: &mut LastPlace,
         level: u8,
         surface: &SurfacePoint,
         rays: &mut u64,
     ) -> Option<u32> {
+        let numbers = self.of_next_cell(self.cells.at(level, surface.position), last)?;
         let width = self.cells.width(level);
         let best = self.best(numbers.clone(), width, surface)?;
-        if !self.sights[best as usize].divided {
+        if !self.divided(best) {
             return Some(best);
         }
         // In the smallest cells any will do.
-        let last = (level == FINEST).then_some(best);
-        self.nearest_seen(accel, numbers, width, surface, rays).or(last)
+        let any = (level == FINEST).then_some(best);
+        self.nearest_seen(accel, numbers, width, surface, rays).or(any)
     }
 
     /// The point that stands for a surface point for which none in its cell does: one in a cell that it is nearly in and that it sees.

@@ -68,9 +68,11 @@ impl SurfaceMesh {
                 }
             });
         }
-        for Left { surface, found, .. } in tiles.into_iter().flatten() {
-            let number = found.unwrap_or_else(|| self.points.own(surface));
-            self.extend();
+        let left = tiles.into_iter().flatten();
+        let chosen: Vec<u32> =
+            left.map(|left| left.found.unwrap_or_else(|| self.points.own(left.surface))).collect();
+        self.extend();
+        for number in chosen {
             let standing = &mut self.states[number as usize].stands_for;
             if *standing == 0 {
                 self.records.push(number);

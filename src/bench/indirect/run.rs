@@ -1,57 +1,18 @@
-//! Light from surfaces: time, rays and error over the number of directions.
+//! All scenes, one after the other.
 
 use std::path::Path;
 
-use serde::Serialize;
-
-use super::opened::Opened;
-use super::report::{Plot, Report, Series, Table};
-use super::scenes::{Failure, SceneResults, scene_files};
-use super::setup::new_report;
-use super::{BenchError, BenchOptions};
+use super::result::{IndirectCurve, IndirectPoint};
+use crate::bench::opened::Opened;
+use crate::bench::report::{Plot, Report, Series, Table};
+use crate::bench::scenes::{Failure, SceneResults, scene_files};
+use crate::bench::setup::new_report;
+use crate::bench::{BenchError, BenchOptions};
 use crate::image::Image;
 use crate::image::metrics::{MetricsOptions, compare};
 use crate::image::tone::auto_exposure;
-use crate::render::{RayCounters, RenderStats, StageSeconds};
-use crate::settings::{IndirectSettings, Settings};
-
-/// What was found about a scene.
-#[derive(Clone, Debug, Serialize)]
-pub struct IndirectCurve {
-    /// Its file.
-    pub name: String,
-    /// Lights.
-    pub lights: usize,
-    /// Triangles.
-    pub triangles: u64,
-    /// Size of the images.
-    pub resolution: [u32; 2],
-    /// Directions of the reference.
-    pub reference_directions: u32,
-    /// Seconds of paths, mesh and shade without light from surfaces.
-    pub direct_seconds: f64,
-    /// With it, by number of directions.
-    pub points: Vec<IndirectPoint>,
-}
-
-/// A number of directions, what it costs and how far it is off.
-#[derive(Clone, Debug, Serialize)]
-pub struct IndirectPoint {
-    /// Directions of a record.
-    pub directions: u32,
-    /// Seconds of paths, mesh and shade: medians.
-    pub seconds: f64,
-    /// The same by stage, of one run.
-    pub stages: StageSeconds,
-    /// Rays by kind.
-    pub rays: RayCounters,
-    /// Points that gathered.
-    pub evaluated: u64,
-    /// FLIP against the reference.
-    pub flip: Option<f64>,
-    /// Mean relative error of block means against it.
-    pub block_mean_relative_error: Option<f64>,
-}
+use crate::render::{RenderStats, StageSeconds};
+use crate::settings::{IndirectForm, IndirectSettings, Settings};
 
 /// Numbers of directions, the default among them, and that of the reference.
 const DIRECTIONS: ([u32; 4], u32) = ([16, 64, 256, 1024], 4096);
@@ -81,11 +42,10 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
 fn with_directions(settings: &Settings, directions: u32) -> Settings {
     let mut settings = settings.clone();
     let bounces = settings.mesh.indirect.as_ref().map(|indirect| indirect.bounces);
-    settings.shading.lambertian |= bounces.is_none();
-    let indirect = match &mut settings.mesh.indirect {
-        Some(indirect) => indirect,
-        None => settings.derive_indirect(),
-    };
+    let indirect = settings.mesh.indirect.get_or_insert_with(|| IndirectSettings {
+        form: IndirectForm::Surface,
+        ..IndirectSettings::default()
+    });
     indirect.bounces = bounces.unwrap_or(IndirectSettings::ALL_BOUNCES);
     indirect.directions = directions;
     settings
@@ -220,7 +180,6 @@ fn plot(curves: &[IndirectCurve]) -> Plot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::IndirectForm;
 
     /// What a scene file says about its indirect light stays; where it has none, surfaces send each other all of it.
     #[test]
