@@ -44,8 +44,7 @@ impl Configuration {
     ///
     /// Nothing is done against leaks: leaves are no walls, and the reference averages over the same points.
     pub fn settings(&self, base: &Settings, resolution: (u32, u32)) -> Settings {
-        let mut settings = base.clone();
-        settings.view.resolution = resolution;
+        let mut settings = of_size(base, resolution);
         settings.mesh = MeshSettings {
             direct: PointSettings {
                 layout: self.layout.clone(),
@@ -81,18 +80,25 @@ pub fn reference(settings: &Settings, samples: u32) -> Settings {
     settings
 }
 
-/// The settings that the scene has, with its light mesh.
-pub fn as_it_is(base: &Settings, resolution: (u32, u32)) -> Settings {
+/// The settings for images of another size. Pixels have one sample each: what is compared is light, which more samples share, and not
+/// camera rays, which are the same either way.
+fn of_size(base: &Settings, resolution: (u32, u32)) -> Settings {
     let mut settings = base.clone();
     settings.view.resolution = resolution;
+    settings.view.samples_per_pixel = 1;
+    settings
+}
+
+/// The settings that the scene has, with its light mesh.
+pub fn as_it_is(base: &Settings, resolution: (u32, u32)) -> Settings {
+    let mut settings = of_size(base, resolution);
     settings.shading.integrator = Integrator::LightMesh;
     settings
 }
 
 /// The settings of conventional tracing.
 pub fn conventional(base: &Settings, resolution: (u32, u32)) -> Settings {
-    let mut settings = base.clone();
-    settings.view.resolution = resolution;
+    let mut settings = of_size(base, resolution);
     settings.shading.integrator = Integrator::Conventional;
     settings
 }

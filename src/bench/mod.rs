@@ -73,6 +73,8 @@ pub struct BenchOptions {
     pub scenes: Vec<PathBuf>,
     /// With the same: size of the images instead of each scene's own.
     pub resolution: Option<(u32, u32)>,
+    /// With the same: samples per pixel instead of one with [`Benchmark::Scenes`], and of each scene's own with [`Benchmark::Indirect`].
+    pub samples_per_pixel: Option<u32>,
 }
 
 impl BenchOptions {

@@ -9,6 +9,7 @@ use crate::accel::Backend;
 use crate::framing::choose_view;
 use crate::render::SessionError;
 use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
+use crate::settings::ViewSettings;
 
 /// The longer side of images of a quick run, pixels.
 const QUICK_SIDE: u32 = 32;
@@ -26,11 +27,13 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// Reads a scene file or model, and builds the acceleration structure.
-    pub fn new(file: &Path, options: &BenchOptions) -> Result<Self, BenchError> {
+    /// Reads a scene file or model, and builds the acceleration structure. Pixels have `samples` each where the options don't say how many, the scene's own if
+    /// `None`.
+    pub fn new(file: &Path, options: &BenchOptions, samples: Option<u32>) -> Result<Self, BenchError> {
         let (load_seconds, opened) = timed(|| open_scene(file));
         let mut opened = opened?;
-        let resolution = &mut opened.loaded.settings.view.resolution;
+        let ViewSettings { resolution, samples_per_pixel, .. } = &mut opened.loaded.settings.view;
+        *samples_per_pixel = options.samples_per_pixel.or(samples).unwrap_or(*samples_per_pixel);
         *resolution = options.resolution.unwrap_or(*resolution);
         if options.quick {
             *resolution = within(*resolution, QUICK_SIDE);

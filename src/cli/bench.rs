@@ -25,6 +25,9 @@ pub struct BenchArgs {
     /// With the same: size of the images instead of each scene's own
     #[arg(long, value_name = "WxH", value_parser = parse::resolution)]
     resolution: Option<(u32, u32)>,
+    /// With the same: camera rays per pixel; without it one with `scenes`, where light is compared, and each scene's own with `indirect`
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    spp: Option<u32>,
     /// Write raw times and goals as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -55,11 +58,12 @@ impl BenchArgs {
     /// Refuses scenes for a benchmark that makes its own.
     pub fn check(&self) -> Result<(), String> {
         let takes_scenes = matches!(self.benchmark, Benchmark::Scenes | Benchmark::Indirect);
-        if takes_scenes || self.scenes.is_empty() && self.resolution.is_none() {
+        let changes_scenes = self.resolution.is_some() || self.spp.is_some();
+        if takes_scenes || self.scenes.is_empty() && !changes_scenes {
             return Ok(());
         }
         Err(format!(
-            "`bench {}` makes its own scenes; only `bench scenes` and `bench indirect` take some, and --resolution",
+            "`bench {}` makes its own scenes; only `bench scenes` and `bench indirect` take some, --resolution and --spp",
             self.benchmark
         ))
     }
@@ -87,6 +91,7 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Result<Outcome, CommandErro
         program: std::env::current_exe().ok(),
         scenes: args.scenes(),
         resolution: args.resolution,
+        samples_per_pixel: args.spp,
     };
     let pool = args.threads.pool()?;
     // The threads of the pool measure; this one listens, so that the listener need not be shared.

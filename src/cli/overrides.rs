@@ -4,7 +4,9 @@ use clap::Args;
 
 use super::choice::named;
 use super::parse;
-use crate::settings::{Estimator, Integrator, Neighbourhood, Radius, Resolve, Settings, Spacing};
+use crate::settings::{
+    Estimator, Integrator, Neighbourhood, PixelFilter, Radius, Resolve, Settings, Spacing,
+};
 
 /// Settings of the scene file that flags can override.
 #[derive(Debug, Default, Args)]
@@ -43,6 +45,12 @@ pub struct Overrides {
     /// Camera rays per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: Option<u32>,
+    /// How they are spread
+    #[arg(long, value_parser = named::<PixelFilter>())]
+    filter: Option<PixelFilter>,
+    /// Width of the filter in pixels
+    #[arg(long, value_name = "W", value_parser = parse::filter_width)]
+    filter_width: Option<f32>,
     /// Brightness of PNG images in stops
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse::exposure)]
     pub exposure: Option<f32>,
@@ -80,6 +88,8 @@ impl Overrides {
         set(&mut mesh.direct.spacing, self.spacing);
         set(&mut view.resolution, self.resolution);
         set(&mut view.samples_per_pixel, self.spp);
+        set(&mut view.filter, self.filter);
+        view.filter_width = self.filter_width.or(view.filter_width);
         set(&mut output.exposure, self.exposure);
     }
 }

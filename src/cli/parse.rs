@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::overrides::Bounces;
 use crate::image::MAX_PIXELS;
-use crate::settings::{MAX_EXPOSURE, Radius, Spacing};
+use crate::settings::{MAX_EXPOSURE, MAX_FILTER_WIDTH, Radius, Spacing};
 
 /// Largest width and height of an image.
 const MAX_SIDE: u32 = 1 << 16;
@@ -31,6 +31,12 @@ pub fn positive<T: FromStr + Copy + Into<f64>>(text: &str) -> Result<T, String> 
 /// A number that is not below 0.
 pub fn non_negative<T: FromStr + Copy + Into<f64>>(text: &str) -> Result<T, String> {
     number(text, "a number from 0 up", |value| value >= 0.0)
+}
+
+/// Width of a pixel filter.
+pub fn filter_width(text: &str) -> Result<f32, String> {
+    let wanted = format!("a number above 0, at most {MAX_FILTER_WIDTH}");
+    number(text, &wanted, |width| width > 0.0 && width <= f64::from(MAX_FILTER_WIDTH))
 }
 
 /// Stops of exposure.

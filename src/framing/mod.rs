@@ -10,7 +10,7 @@ mod outside;
 mod probe;
 
 use self::probe::Probe;
-use crate::accel::{Accel, Backend, with_accel};
+use crate::accel::{Accel, Backend};
 use crate::scene::load::OpenedScene;
 use crate::scene::{Camera, Light};
 
@@ -50,12 +50,12 @@ pub fn choose_view(opened: &OpenedScene, backend: &Backend) -> ChosenView {
     let aspect = width as f32 / height as f32;
     let mut chosen = ChosenView::default();
     if loaded.cameras.is_empty() {
-        let view = with_accel!(backend, accel => {
-            let probe = Probe { accel, scene: &loaded.scene, bounds: loaded.scene.bounds() };
+        let view = {
+            let probe = Probe { accel: backend, scene: &loaded.scene, bounds: loaded.scene.bounds() };
             // Materials may be changed for a view of a bare model only, and two-sided ones have no back.
             let can_cull = *bare && loaded.scene.materials.iter().all(|material| !material.two_sided);
             choose(&probe, aspect, can_cull)
-        });
+        };
         chosen.choices.push(format!("no camera in the file: {}", view.how));
         chosen.camera = Some(view.camera);
         chosen.cull = view.cut_open;

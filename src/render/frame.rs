@@ -9,7 +9,7 @@ use super::error::RenderError;
 use super::film::{TileSink, resolve, resolve_block};
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};
-use super::trace::{PathVertex, TilePaths, trace_paths};
+use super::trace::{TilePaths, trace_paths};
 use crate::accel::Accel;
 use crate::image::Image;
 use crate::scene::{Camera, CameraRays};
@@ -21,8 +21,8 @@ pub trait BlockIntegrator: Sync {
     /// Evaluates what the surface points of a block need.
     fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
 
-    /// Shades surface points of a tile: fills `light` with one E for each, such that k_d·E is the light sent back.
-    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters;
+    /// Shades the vertices of a tile: fills `light` with one E for each, such that k_d·E is the light sent back.
+    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters;
 }
 
 /// Stops a render between two tiles. Clones stop the same renders.
@@ -77,7 +77,7 @@ impl<'a, A: Accel> Frame<'a, A> {
         sink: &'a dyn TileSink,
         stop: &'a StopToken,
     ) -> Self {
-        let camera = CameraRays::new(camera, view.resolution, view.samples_per_pixel);
+        let camera = CameraRays::new(camera, view.resolution, 1).with_samples(view.samples());
         let block_pixels = view.block_samples.unwrap_or(BLOCK_SAMPLES) / u64::from(view.samples_per_pixel);
         let blocks = blocks(view.resolution, block_pixels);
         Self { world, view, camera, blocks, sink, stop, kept: Vec::new() }
@@ -183,7 +183,7 @@ impl<'a, A: Accel> Frame<'a, A> {
 /// weight · (Emiss + k_d · I), whose first part is there already.
 pub fn shade_tile(integrator: &impl BlockIntegrator, tile: &Tile, paths: &mut TilePaths) -> ShadeCounters {
     let mut light = vec![Vec3::ZERO; paths.vertices.len()];
-    let counters = integrator.shade(tile, &paths.vertices, &mut light);
+    let counters = integrator.shade(tile, paths, &mut light);
     for (vertex, light) in paths.vertices.iter().zip(light) {
         paths.radiance[vertex.pixel as usize] += vertex.reflectance * light;
     }

@@ -30,7 +30,6 @@ impl NullaryFnOnce for NeededByTile<'_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let surfaces = self.paths.vertices.iter().map(|vertex| &vertex.surface);
-        self.lookup.needed(surfaces).into_bricks().collect()
+        self.lookup.needed(self.paths.surfaces()).into_bricks().collect()
     }
 }

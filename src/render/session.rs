@@ -11,7 +11,7 @@ use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::stats::{RenderStats, timed};
 use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
-use crate::accel::{Accel, Backend, BackendChoice, with_accel};
+use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectField};
 use crate::light_mesh::store::PointMask;
@@ -111,17 +111,15 @@ impl Session {
         stop: &StopToken,
     ) -> Result<(Image, RenderStats), RenderError> {
         let Self { scene, backend, lights, emissive, meshes } = self;
-        with_accel!(&*backend, accel => {
-            let world = World { accel, scene, lights, emissive };
-            render_world(world, camera, settings, meshes, sink, stop)
-        })
+        let world = World { accel: &*backend, scene, lights, emissive };
+        render_world(world, camera, settings, meshes, sink, stop)
     }
 
     /// DirectLight of eq. (1) at positions in free space, linear RGB, with the visibility of every light traced; needs no
     /// surface and no normal.
     pub fn direct_light(&self, positions: &[Vec3]) -> Vec<Vec3> {
         let mut field = DirectField::default();
-        with_accel!(&self.backend, accel => field.trace(accel, &self.lights, positions));
+        field.trace(&self.backend, &self.lights, positions);
         field.derive(&self.lights, Basis::Light, positions);
         (0..positions.len() as u32)
             .map(|slot| {
@@ -145,10 +143,8 @@ pub fn render(
     let lights = PackedLights::of_scene(scene);
     let emissive = EmissiveTriangles::of_scene(scene);
     let mut meshes = LightMeshes::new(scene.bounds());
-    with_accel!(backend, accel => {
-        let world = World { accel, scene, lights: &lights, emissive: &emissive };
-        render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
-    })
+    let world = World { accel: backend, scene, lights: &lights, emissive: &emissive };
+    render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
 }
 
 fn render_world<A: Accel>(

@@ -4,16 +4,15 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use pulp::NullaryFnOnce;
-use rayon::prelude::*;
 
 use super::error::RenderError;
 use super::frame::{BlockIntegrator, Frame};
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::Tile;
-use super::trace::{PathVertex, TilePaths, pixel_groups};
+use super::trace::TilePaths;
 use crate::accel::Accel;
-use crate::light_mesh::surface::{PixelGroup, SurfaceMesh, SurfaceView};
-use crate::scene::{Camera, SurfacePoint};
+use crate::light_mesh::surface::{SurfaceMesh, SurfaceView};
+use crate::scene::Camera;
 use crate::settings::{Normalization, Settings};
 use crate::simd::vectorize;
 
@@ -33,12 +32,8 @@ pub fn evaluate_surface_light<A: Accel>(
     frame.trace_image(stats, |paths, stats| {
         let mut seconds = stats.seconds.mesh;
         timed(&mut seconds, || {
-            let footprint = mesh.view().footprint;
-            let middles = |paths: &TilePaths| -> Vec<SurfacePoint> {
-                paths.groups(&footprint).groups.iter().map(PixelGroup::middle).collect()
-            };
-            let middles: Vec<Vec<SurfacePoint>> = paths.par_iter().map(middles).collect();
-            stats.add_surface(mesh.need(world, middles.iter().map(|tile| tile.iter().collect()).collect()));
+            let surfaces = paths.iter().map(|paths| paths.surfaces().collect()).collect();
+            stats.add_surface(mesh.need(world, surfaces));
         });
         stats.seconds.mesh = seconds;
     })?;
@@ -80,10 +75,10 @@ impl<I: BlockIntegrator, A: Accel> BlockIntegrator for WithSurfaceLight<'_, I, A
         self.direct.evaluate(paths, stats);
     }
 
-    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
-        let mut counters = self.direct.shade(tile, vertices, light);
+    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
+        let mut counters = self.direct.shade(tile, paths, light);
         if let Some(surface) = &self.surface {
-            counters.shadow_rays += vectorize(Add { surface, tile, vertices, light });
+            counters.shadow_rays += vectorize(Add { surface, paths, light });
         }
         counters
     }
@@ -92,8 +87,7 @@ impl<I: BlockIntegrator, A: Accel> BlockIntegrator for WithSurfaceLight<'_, I, A
 /// Adding light from surfaces to that of the surface points of a tile, as work for the best instruction set.
 struct Add<'a, A> {
     surface: &'a SurfaceLight<'a, A>,
-    tile: &'a Tile,
-    vertices: &'a [PathVertex],
+    paths: &'a TilePaths,
     light: &'a mut [Vec3],
 }
 
@@ -102,8 +96,7 @@ impl<A: Accel> NullaryFnOnce for Add<'_, A> {
 
     #[inline(always)]
     fn call(self) -> u64 {
-        let Self { surface: SurfaceLight { accel, mesh, scale }, tile, vertices, light } = self;
-        let groups = pixel_groups(vertices, tile.pixels(), &mesh.view().footprint);
-        mesh.illuminate(*accel, &groups, *scale, light)
+        let Self { surface: SurfaceLight { accel, mesh, scale }, paths, light } = self;
+        mesh.illuminate(*accel, paths.surfaces(), *scale, light)
     }
 }

@@ -1,27 +1,33 @@
 //! First stage: the camera paths of a tile, steps 2 and 3 of the paper's algorithm, as a wavefront.
 
+use std::ops::Range;
+
 use glam::Vec3;
 use pulp::NullaryFnOnce;
 
+use super::merge::{SampleMerger, Seen};
 use super::tiles::Tile;
-use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, hit_of_lane};
-use crate::light_mesh::surface::PixelGroups;
-use crate::scene::{CameraRays, Hit, Interaction, PixelFootprint, Ray, Scene, SurfacePoint};
+use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
+use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene, SurfacePoint};
 use crate::settings::ViewSettings;
 use crate::simd::vectorize;
 use crate::world::World;
 
-/// A surface point on a camera path, and how much of its illumination reaches the pixel.
+/// A surface that camera paths of a pixel meet, and how much of its illumination reaches the pixel.
 ///
 /// A block's vertices are written once and read twice from memory: only what that needs is here.
 #[derive(Clone, Copy, Debug)]
 pub struct PathVertex {
-    /// The point.
+    /// The point that stands for all that are seen.
     pub surface: SurfacePoint,
-    /// k_d times the product of the k_s before it.
+    /// k_d times the product of the k_s before it, summed over the samples.
     pub reflectance: Vec3,
     /// Pixel within the tile.
     pub pixel: u32,
+    /// Its samples among the origins of the tile, if pixels have several.
+    pub(super) first_sample: u32,
+    /// Samples that see the surface.
+    pub samples: u32,
 }
 
 /// The camera paths of a tile: all surface points that have to be shaded.
@@ -29,6 +35,8 @@ pub struct PathVertex {
 pub struct TilePaths {
     /// Surface points; those of 16 neighbouring rays follow each other.
     pub vertices: Vec<PathVertex>,
+    /// Where shadow rays of the vertices' samples start, if pixels have several samples.
+    pub origins: Vec<Vec3>,
     /// Radiance, summed over the samples of each pixel of the tile: of background and emission once the paths are traced,
     /// of everything once their vertices are shaded.
     pub radiance: Vec<Vec3>,
@@ -39,17 +47,16 @@ pub struct TilePaths {
 }
 
 impl TilePaths {
-    /// The surface points in groups that are close together.
-    pub fn groups(&self, footprint: &PixelFootprint) -> PixelGroups {
-        pixel_groups(&self.vertices, self.radiance.len(), footprint)
+    /// The vertices' surface points.
+    pub fn surfaces(&self) -> impl Iterator<Item = &SurfacePoint> {
+        self.vertices.iter().map(|vertex| &vertex.surface)
     }
-}
 
-/// The surface points of a tile of so many pixels in groups that are close together.
-#[inline(always)]
-pub fn pixel_groups(vertices: &[PathVertex], pixels: usize, footprint: &PixelFootprint) -> PixelGroups {
-    let surfaces = vertices.iter().map(|vertex| (vertex.pixel, &vertex.surface));
-    PixelGroups::new(surfaces, pixels, footprint)
+    /// Where shadow rays of a vertex's samples start; empty if pixels have one sample each.
+    pub fn origins_of(&self, vertex: &PathVertex) -> &[Vec3] {
+        let first = vertex.first_sample as usize;
+        self.origins.get(first..first + vertex.samples as usize).unwrap_or_default()
+    }
 }
 
 /// A camera ray or reflection under way.
@@ -61,6 +68,9 @@ struct Pending {
 
 /// Rays of a camera packet.
 const WIDTH: usize = 16;
+
+/// All of them.
+const ALL: LaneMask = (1 << WIDTH) - 1;
 
 /// How many culled back faces a camera ray may pass: more are taken for a trap (coincident faces).
 const MAX_PASSES: u32 = 1024;
@@ -105,24 +115,31 @@ fn trace_tile<A: Accel>(
 ) {
     let samples = view.samples_per_pixel;
     paths.vertices.clear();
-    paths.vertices.reserve(tile.pixels() * samples as usize);
+    paths.vertices.reserve(tile.pixels());
+    paths.origins.clear();
     paths.radiance.clear();
     paths.radiance.resize(tile.pixels(), Vec3::ZERO);
     paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
     paths.reflection_rays = 0;
     let World { accel, scene, .. } = world;
-    let mut tracer = Tracer { accel, scene, paths, reflections: Vec::new(), view };
+    let merger = SampleMerger::new(camera.footprint(), tile.pixels(), samples);
+    let mut tracer = Tracer { accel, scene, paths, merger, reflections: Vec::new(), view };
+    let more = view.most_samples() - samples;
     let mut square = Vec::with_capacity(WIDTH);
     for pixels in tile.squares() {
         square.clear();
         square.extend(pixels);
-        for sample in 0..samples {
-            let rays = square.iter().map(|&(x, y, pixel)| Pending {
-                ray: camera.ray(x, y, sample),
-                weight: Vec3::ONE,
-                pixel,
-            });
-            tracer.trace(rays, 1, Coherence::Coherent);
+        let first = (tracer.paths.vertices.len(), tracer.reflections.len());
+        tracer.trace_square(camera, &square, 0..samples);
+        if more > 0 {
+            square.retain(|&(_, _, pixel)| tracer.merger.is_mixed(pixel, samples));
+            tracer.trace_square(camera, &square, samples..samples + more);
+            tracer.paths.camera_rays += square.len() as u64 * u64::from(more);
+        }
+        tracer.merger.finish(tracer.paths);
+        if more > 0 {
+            let pixels = square.iter().map(|&(_, _, pixel)| pixel);
+            tracer.weaken(pixels, samples as f32 / (samples + more) as f32, first);
         }
     }
     let mut wave = std::mem::take(&mut tracer.reflections);
@@ -133,6 +150,7 @@ fn trace_tile<A: Accel>(
         while rays.peek().is_some() {
             tracer.trace(rays.by_ref().take(WIDTH), depth, Coherence::Incoherent);
         }
+        tracer.merger.finish(tracer.paths);
         wave = std::mem::take(&mut tracer.reflections);
         depth += 1;
     }
@@ -143,10 +161,73 @@ struct Tracer<'a, A> {
     scene: &'a Scene,
     view: &'a ViewSettings,
     paths: &'a mut TilePaths,
+    merger: SampleMerger,
     reflections: Vec<Pending>,
 }
 
 impl<A: Accel> Tracer<'_, A> {
+    /// Traces some samples of the camera rays of up to 16 pixels, given by column, row, and index within the tile.
+    #[inline(always)]
+    fn trace_square(&mut self, camera: &CameraRays, pixels: &[(u32, u32, u32)], samples: Range<u32>) {
+        if samples.len() % WIDTH == 0 {
+            for &(x, y, pixel) in pixels {
+                for first in samples.clone().step_by(WIDTH) {
+                    self.trace_pixel(camera, (x, y, pixel), first);
+                }
+            }
+            return;
+        }
+        let rays = pixels.iter().flat_map(|&(x, y, pixel)| {
+            let ray = move |sample| Pending { ray: camera.ray(x, y, sample), weight: Vec3::ONE, pixel };
+            samples.clone().map(ray)
+        });
+        let mut rays = rays.peekable();
+        while rays.peek().is_some() {
+            self.trace(rays.by_ref().take(WIDTH), 1, Coherence::Coherent);
+        }
+    }
+
+    /// Traces sixteen samples of a pixel.
+    #[inline(always)]
+    fn trace_pixel(&mut self, camera: &CameraRays, (x, y, pixel): (u32, u32, u32), first: u32) {
+        let mut packet = RayHitPacket::<WIDTH>::empty();
+        let origin = camera.origin();
+        let [dir_x, dir_y, dir_z] = camera.directions(x, y, first);
+        let RayHitPacket { ray, hit } = &mut packet;
+        (ray.org_x, ray.org_y, ray.org_z) = ([origin.x; WIDTH], [origin.y; WIDTH], [origin.z; WIDTH]);
+        (ray.dir_x, ray.dir_y, ray.dir_z) = (dir_x, dir_y, dir_z);
+        (ray.tnear, ray.tfar) = ([0.0; WIDTH], [f32::INFINITY; WIDTH]);
+        (hit.geom_id, hit.inst_id) = ([INVALID_ID; WIDTH], [INVALID_ID; WIDTH]);
+        self.accel.intersect_packet(ALL, &mut packet, Coherence::Coherent);
+        if self.arrive_together(pixel, &packet) {
+            return;
+        }
+        for lane in 0..WIDTH {
+            let direction = Vec3::new(dir_x[lane], dir_y[lane], dir_z[lane]);
+            let pending = Pending { ray: Ray::new(origin, direction), weight: Vec3::ONE, pixel };
+            self.arrive(&pending, hit_of_lane(&packet, lane), 1);
+        }
+    }
+
+    /// Multiplies all that camera rays of some pixels found by a factor: each of them counts for less. The first of their vertices and
+    /// reflections are given.
+    #[inline(always)]
+    fn weaken(&mut self, pixels: impl Iterator<Item = u32> + Clone, factor: f32, first: (usize, usize)) {
+        for pixel in pixels.clone() {
+            self.paths.radiance[pixel as usize] *= factor;
+        }
+        for vertex in &mut self.paths.vertices[first.0..] {
+            if pixels.clone().any(|pixel| pixel == vertex.pixel) {
+                vertex.reflectance *= factor;
+            }
+        }
+        for reflection in &mut self.reflections[first.1..] {
+            if pixels.clone().any(|pixel| pixel == reflection.pixel) {
+                reflection.weight *= factor;
+            }
+        }
+    }
+
     /// Traces up to 16 rays as a packet; `depth` counts the surface points that they lead to, from 1.
     #[inline(always)]
     fn trace(&mut self, rays: impl Iterator<Item = Pending>, depth: u32, coherence: Coherence) {
@@ -166,6 +247,50 @@ impl<A: Accel> Tracer<'_, A> {
         }
     }
 
+    /// Takes up what sixteen samples of a pixel found if they hit one triangle, which is no mirror: most do. Returns whether it did.
+    #[inline(always)]
+    fn arrive_together(&mut self, pixel: u32, packet: &RayHitPacket<WIDTH>) -> bool {
+        let RayHitPacket { ray, hit } = packet;
+        let mut differ = 0;
+        for lane in 0..WIDTH {
+            differ |= hit.geom_id[lane] ^ hit.geom_id[0];
+            differ |= hit.inst_id[lane] ^ hit.inst_id[0];
+            differ |= hit.prim_id[lane] ^ hit.prim_id[0];
+        }
+        let direction = Vec3::new(ray.dir_x[0], ray.dir_y[0], ray.dir_z[0]);
+        let Some(hit) = hit_of_lane(packet, 0).filter(|_| differ == 0) else { return false };
+        let (u, v) = (&packet.hit.u, &packet.hit.v);
+        let (seen, positions) = self.scene.interaction_of_all(&hit, u, v, direction);
+        if seen.culled || self.is_mirrored(seen.specular, 1) {
+            return false;
+        }
+        let surface = seen.point;
+        let mut farthest = 0.0f32;
+        for lane in 0..WIDTH {
+            let [x, y, z] = [0, 1, 2].map(|axis| positions[axis][lane] - surface.position[axis]);
+            let distance = x * x + y * y + z * z;
+            farthest = if distance > farthest { distance } else { farthest };
+        }
+        if !self.merger.is_narrow(&surface, farthest.sqrt()) {
+            return false;
+        }
+        let above = surface.geometric_normal * surface.offset;
+        let [x, y, z] = positions;
+        let origins = (0..WIDTH).map(|lane| Vec3::new(x[lane], y[lane], z[lane]) + above);
+        let samples = WIDTH as u32;
+        let reflectance = seen.diffuse * samples as f32;
+        let emission = seen.emission * samples as f32;
+        self.paths.radiance[pixel as usize] += emission;
+        self.merger.add(Seen { surface, reflectance, emission, pixel, samples }, origins, self.paths);
+        true
+    }
+
+    /// Whether a reflection of this weight is followed at the surface point of this number.
+    #[inline(always)]
+    fn is_mirrored(&self, weight: Vec3, depth: u32) -> bool {
+        weight.max_element() > self.view.weight_threshold && depth < self.view.max_depth
+    }
+
     /// Takes up what a ray found.
     #[inline(always)]
     fn arrive(&mut self, pending: &Pending, hit: Option<Hit>, depth: u32) {
@@ -175,12 +300,14 @@ impl<A: Accel> Tracer<'_, A> {
             *radiance += pending.weight * self.scene.background;
             return;
         };
-        *radiance += pending.weight * seen.emission;
+        let emission = pending.weight * seen.emission;
+        *radiance += emission;
         let surface = seen.point;
         let reflectance = pending.weight * seen.diffuse;
-        self.paths.vertices.push(PathVertex { surface, reflectance, pixel: pending.pixel });
+        let seen_once = Seen { surface, reflectance, emission, pixel: pending.pixel, samples: 1 };
+        self.merger.add(seen_once, [surface.ray_origin()], self.paths);
         let weight = pending.weight * seen.specular;
-        if weight.max_element() > self.view.weight_threshold && depth < self.view.max_depth {
+        if self.is_mirrored(weight, depth) {
             let direction = pending.ray.direction;
             let mirrored = direction.reflect(surface.shading_normal);
             // A shading normal may turn the reflection below the surface; the geometric one can't.

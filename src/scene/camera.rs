@@ -26,6 +26,14 @@ pub struct PixelFootprint {
     pub edge: f32,
 }
 
+impl PixelFootprint {
+    /// Edge of a pixel at a position.
+    #[inline(always)]
+    pub fn edge_at(&self, position: Vec3) -> f32 {
+        self.edge * position.distance(self.eye)
+    }
+}
+
 /// A camera that shows nothing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{} {}", self.field(), self.problem())]

@@ -1,8 +1,10 @@
-//! Camera rays through stratified positions in the pixels.
+//! Camera rays through the samples of pixels.
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Camera, Ray};
+use super::{Camera, PixelFootprint, Ray};
+use crate::sampling::pixel_pattern;
+use crate::simd::{LANES, Lanes};
 
 /// Maps positions in the image to camera rays.
 #[derive(Clone, Debug)]
@@ -14,7 +16,8 @@ pub struct CameraRays {
     /// The same, downwards.
     down: Vec3,
     middle: Vec2,
-    strata: (u32, u32),
+    /// Samples of a pixel, from its upper left corner.
+    samples: Vec<Vec2>,
 }
 
 impl CameraRays {
@@ -42,47 +45,56 @@ impl CameraRays {
             right: right * pixel,
             down: down * pixel,
             middle: Vec2::new(width, height) * 0.5,
-            strata: strata(samples_per_pixel),
+            samples: pixel_pattern(samples_per_pixel),
         }
+    }
+
+    /// The same rays, but through these positions in every pixel, from its upper left corner; at least one.
+    pub fn with_samples(self, samples: Vec<Vec2>) -> Self {
+        Self { samples, ..self }
+    }
+
+    /// How large pixels are where the rays end.
+    pub fn footprint(&self) -> PixelFootprint {
+        PixelFootprint { eye: self.origin, edge: self.right.length() }
     }
 
     /// Ray of sample `sample` of the pixel in column `x`, row `y` (from the top left).
     ///
-    /// One sample per pixel goes through its centre; several are jittered within a grid of strata. The
-    /// position depends on pixel and sample alone.
+    /// One sample per pixel goes through its centre. Several have the same pattern in all pixels.
+    ///
+    /// # Panics
+    /// Beyond the number of samples.
     #[inline(always)]
     pub fn ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        let offset = if self.strata == (1, 1) {
-            Vec2::splat(0.5)
-        } else {
-            let (columns, rows) = self.strata;
-            let noise = hash(x, y, sample);
-            let jitter = Vec2::new((noise & 0xffff) as f32, (noise >> 16) as f32) / 65536.0;
-            let stratum = Vec2::new((sample % columns) as f32, (sample / columns) as f32);
-            (stratum + jitter) / Vec2::new(columns as f32, rows as f32)
-        };
+        let offset = self.samples[sample as usize];
         let at = Vec2::new(x as f32, y as f32) + offset - self.middle;
         Ray::new(self.origin, self.forward + self.right * at.x + self.down * at.y)
     }
-}
 
-/// The grid of strata closest to a square that has exactly `samples` cells.
-fn strata(samples: u32) -> (u32, u32) {
-    let rows = (1..=samples.isqrt()).rev().find(|rows| samples.is_multiple_of(*rows)).unwrap_or(1);
-    (samples / rows, rows)
-}
+    /// Where all rays start.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
 
-/// Well-mixed bits of pixel and sample (the finaliser of MurmurHash3 over a linear combination).
-fn hash(x: u32, y: u32, sample: u32) -> u32 {
-    let mut h = x
-        .wrapping_mul(0x9E37_79B1)
-        .wrapping_add(y.wrapping_mul(0x85EB_CA77))
-        .wrapping_add(sample.wrapping_mul(0xC2B2_AE3D));
-    h ^= h >> 16;
-    h = h.wrapping_mul(0x85EB_CA6B);
-    h ^= h >> 13;
-    h = h.wrapping_mul(0xC2B2_AE35);
-    h ^ h >> 16
+    /// Directions of the rays of sixteen samples of a pixel, from one on, by axis.
+    ///
+    /// # Panics
+    /// Beyond the number of samples.
+    #[inline(always)]
+    pub fn directions(&self, x: u32, y: u32, first_sample: u32) -> [Lanes; 3] {
+        let mut directions = [[0.0; LANES]; 3];
+        let samples = &self.samples[first_sample as usize..][..LANES];
+        for lane in 0..LANES {
+            let at_x = x as f32 + samples[lane].x - self.middle.x;
+            let at_y = y as f32 + samples[lane].y - self.middle.y;
+            for axis in 0..3 {
+                directions[axis][lane] =
+                    self.forward[axis] + self.right[axis] * at_x + self.down[axis] * at_y;
+            }
+        }
+        directions
+    }
 }
 
 #[cfg(test)]
@@ -104,22 +116,14 @@ mod tests {
         assert!(opposite.abs_diff_eq(Vec3::new(1.99, -0.99, -1.0), 1e-5), "{opposite}");
     }
 
-    /// Each stratum of a pixel holds exactly one sample, whatever their number.
+    /// Sixteen at once are the same rays.
     #[test]
-    fn samples_are_stratified() {
-        for samples in [2, 3, 4, 6, 7, 16, 30] {
-            let rays = CameraRays::new(&camera(), (8, 8), samples);
-            let (columns, rows) = strata(samples);
-            assert_eq!(columns * rows, samples);
-            let mut seen = vec![0; samples as usize];
-            for sample in 0..samples {
-                let d = rays.ray(5, 3, sample).direction;
-                let in_pixel = Vec2::new(d.x, -d.y) * 4.0 + Vec2::splat(4.0) - Vec2::new(5.0, 3.0);
-                let column = (in_pixel.x * columns as f32) as u32;
-                let row = (in_pixel.y * rows as f32) as u32;
-                seen[(row * columns + column) as usize] += 1;
-            }
-            assert!(seen.iter().all(|&count| count == 1), "{samples}: {seen:?}");
+    fn samples_side_by_side_are_those_one_by_one() {
+        let rays = CameraRays::new(&camera(), (200, 100), 32);
+        let directions = rays.directions(17, 61, 16);
+        for lane in 0..LANES {
+            let [x, y, z] = directions.map(|axis| axis[lane]);
+            assert_eq!(rays.ray(17, 61, 16 + lane as u32), Ray::new(rays.origin(), Vec3::new(x, y, z)));
         }
     }
 

@@ -5,6 +5,7 @@ use glam::{Mat3A, Vec2, Vec3, Vec3A};
 use super::ray::Hit;
 use super::scene::Scene;
 use super::texture::TextureMap;
+use crate::simd::{LANES, Lanes, horizontal_sum};
 
 /// A visible surface point y (docs/method.md §1).
 ///
@@ -72,6 +73,54 @@ impl Scene {
     /// Surface point and material of a hit, seen along `direction` (any length).
     #[inline(always)]
     pub fn interaction(&self, hit: &Hit, direction: Vec3) -> Interaction {
+        self.interaction_with(hit, direction, |map, corners| {
+            map.sample(corners[0] * (1.0 - hit.u - hit.v) + corners[1] * hit.u + corners[2] * hit.v).0
+        })
+    }
+
+    /// The same in the middle of sixteen hits on one triangle, with the mean of what textures have at each of them; and where the
+    /// hits lie, by axis.
+    ///
+    /// `hit` names the triangle; the barycentric coordinates are those of the sixteen.
+    #[inline(always)]
+    pub fn interaction_of_all(
+        &self,
+        hit: &Hit,
+        u: &Lanes,
+        v: &Lanes,
+        direction: Vec3,
+    ) -> (Interaction, [Lanes; 3]) {
+        let part = 1.0 / LANES as f32;
+        let middle = Hit { u: horizontal_sum(u) * part, v: horizontal_sum(v) * part, ..*hit };
+        let interaction = self.interaction_with(&middle, direction, |map, [a, b, c]| {
+            let at = |lane: usize| a * (1.0 - u[lane] - v[lane]) + b * u[lane] + c * v[lane];
+            (0..LANES).map(|lane| map.sample(at(lane)).0).sum::<Vec3>() * part
+        });
+        let instance = &self.instances[hit.instance as usize];
+        let corners = self.meshes[instance.mesh as usize].corners(hit.triangle);
+        let [a, b, c] = match &instance.to_world {
+            Some(to_world) => corners.map(|corner| to_world.transform_point3(corner)),
+            None => corners,
+        };
+        let positions = [0, 1, 2].map(|axis| {
+            let (start, along_u, along_v) = (a[axis], b[axis] - a[axis], c[axis] - a[axis]);
+            let mut positions = [0.0; LANES];
+            for lane in 0..LANES {
+                positions[lane] = start + u[lane] * along_u + v[lane] * along_v;
+            }
+            positions
+        });
+        (interaction, positions)
+    }
+
+    /// The interaction at a hit; `color` is the colour of a texture, given the texture coordinates of the triangle's corners.
+    #[inline(always)]
+    fn interaction_with(
+        &self,
+        hit: &Hit,
+        direction: Vec3,
+        color: impl Fn(&TextureMap, [Vec2; 3]) -> Vec3,
+    ) -> Interaction {
         let instance = &self.instances[hit.instance as usize];
         let mesh = &*self.meshes[instance.mesh as usize];
         let corners = mesh.corners(hit.triangle);
@@ -118,12 +167,10 @@ impl Scene {
         let mut diffuse = material.diffuse;
         let mut emission = if front || material.two_sided { material.emission } else { Vec3::ZERO };
         if material.diffuse_map.is_some() || material.emission_map.is_some() {
-            let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
-                let [a, b, c] =
-                    mesh.triangles[hit.triangle as usize].map(|i| Vec2::from_array(uvs[i as usize]));
-                a * w + b * u + c * v
+            let corners = mesh.uvs.as_ref().map_or([Vec2::ZERO; 3], |uvs| {
+                mesh.triangles[hit.triangle as usize].map(|i| Vec2::from_array(uvs[i as usize]))
             });
-            let color = |map: &Option<TextureMap>| map.as_ref().map_or(Vec3::ONE, |map| map.sample(uv).0);
+            let color = |map: &Option<TextureMap>| map.as_ref().map_or(Vec3::ONE, |map| color(map, corners));
             diffuse *= color(&material.diffuse_map);
             emission *= color(&material.emission_map);
         }

@@ -3,6 +3,7 @@
 use super::mesh::{PointLayout, PointSettings, Spacing};
 use super::settings::Settings;
 use super::shading::Radius;
+use super::view::MAX_FILTER_WIDTH;
 use crate::image::MAX_PIXELS;
 
 /// A setting out of its range.
@@ -47,6 +48,9 @@ impl Settings {
         )?;
         let one_or_more = |name, count: u32| check(name, "be at least 1", count, count >= 1);
         one_or_more("view.samples_per_pixel", view.samples_per_pixel)?;
+        if let Some(width) = view.filter_width {
+            check("view.filter_width", "lie in (0, 16]", width, width > 0.0 && width <= MAX_FILTER_WIDTH)?;
+        }
         one_or_more("view.max_depth", view.max_depth)?;
         one_or_more("shading.reference_samples", shading.reference_samples)?;
         let threshold = view.weight_threshold;
@@ -108,6 +112,7 @@ mod tests {
         };
         assert_eq!(refused(&|s| s.view.resolution = (0, 5)), "view.resolution");
         assert_eq!(refused(&|s| s.view.samples_per_pixel = 0), "view.samples_per_pixel");
+        assert_eq!(refused(&|s| s.view.filter_width = Some(f32::NAN)), "view.filter_width");
         assert_eq!(refused(&|s| s.shading.reference_samples = 0), "shading.reference_samples");
         assert_eq!(refused(&|s| s.shading.tolerance = -0.01), "shading.tolerance");
         assert_eq!(refused(&|s| s.shading.kernel.radius = Radius::Units(f32::NAN)), "shading.kernel.radius");

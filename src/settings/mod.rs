@@ -23,6 +23,6 @@ pub use shading::{
     Estimator, IndirectShading, Integrator, KernelSettings, Leaks, Neighbourhood, Normalization, Radius,
     Resolve, ShadingSettings,
 };
-pub use view::ViewSettings;
+pub use view::{MAX_FILTER_WIDTH, PixelFilter, ViewSettings};
 
 pub(crate) use names::named_enum;

@@ -135,6 +135,8 @@ pub fn session(scene: &Scene) -> Session {
 /// The default settings at a resolution.
 pub fn settings_at(resolution: (u32, u32)) -> Settings {
     let mut settings = Settings::default();
+    // What is promised holds for each surface point; several to a pixel would only be their mean.
+    settings.view.samples_per_pixel = 1;
     // What `auto` takes is tested by itself.
     settings.shading.integrator = Integrator::LightMesh;
     settings.view.resolution = resolution;

@@ -28,6 +28,8 @@ fn opened(model: &str) -> Option<LoadedScene> {
     loaded.settings.shading.resolve = Resolve::Average;
     // Reflections would bring in surfaces that the test doesn't look at.
     loaded.settings.view.max_depth = 1;
+    // Bounds are those of the surface points in the pixels' centres.
+    loaded.settings.view.samples_per_pixel = 1;
     Some(loaded)
 }
 

@@ -52,7 +52,7 @@ fn with_directions(settings: &Settings, directions: u32) -> Settings {
 }
 
 fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Result<IndirectCurve, BenchError> {
-    let opened = Opened::new(file, options)?;
+    let opened = Opened::new(file, options, None)?;
     let name = file.display().to_string();
     let (counts, reference_directions) = if options.quick { FEW_DIRECTIONS } else { DIRECTIONS };
     let base = &opened.setup.settings;

@@ -30,7 +30,7 @@ fn frame(opened: &Opened, integrator: Integrator) -> Result<(Image, Run), BenchE
 
 /// Measures a scene; raw times go to the report.
 pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Result<SceneResult, BenchError> {
-    let mut opened = Opened::new(file, options)?;
+    let mut opened = Opened::new(file, options, Some(1))?;
     // Ways to direct light are compared; light from points on surfaces goes with either.
     opened.setup.settings.mesh.indirect.take_if(|indirect| indirect.form == IndirectForm::Surface);
     if opened.setup.scene.lights.is_empty() {

@@ -10,7 +10,6 @@ use super::gather::Gather;
 use super::gathered::Gathered;
 use super::interpolate::{interpolate, neighbours};
 use super::last_place::LastPlace;
-use super::pixels::PixelGroups;
 use super::points::{FINEST, SurfacePoints};
 use crate::accel::Accel;
 use crate::scene::{PixelFootprint, SurfacePoint};
@@ -226,31 +225,21 @@ impl SurfaceMesh {
         self.list_of.resize(count, 0..0);
     }
 
-    /// Adds what the points of some groups, which were needed, receive from surfaces, over π and times `scale`, to their light, in the order in which they were
-    /// grouped; counts rays.
+    /// Adds what surface points, which were needed, receive from surfaces, over π and times `scale`, to their light; counts rays.
     #[inline(always)]
-    pub fn illuminate<A: Accel>(
+    pub fn illuminate<'s, A: Accel>(
         &self,
         accel: &A,
-        groups: &PixelGroups,
+        surfaces: impl Iterator<Item = &'s SurfacePoint>,
         scale: f32,
         light: &mut [Vec3],
     ) -> u64 {
         let mut scratch = SurfaceScratch::default();
-        let values: Vec<Vec3> = groups
-            .groups
-            .iter()
-            .map(|group| {
-                // A single point may lie in a crease, a rounding error below the surface beside it.
-                let middle = group.middle();
-                let Some(number) = self.place(accel, &middle, &mut scratch) else { return Vec3::ZERO };
-                let list = self.list_of[number as usize].clone();
-                let list = self.lists.get(list.start as usize..list.end as usize).unwrap_or_default();
-                interpolate(&self.points, &middle, list, &self.received)
-            })
-            .collect();
-        for (light, &group) in light.iter_mut().zip(&groups.group_of) {
-            *light += values[group as usize] * scale;
+        for (surface, light) in surfaces.zip(light) {
+            let Some(number) = self.place(accel, surface, &mut scratch) else { continue };
+            let list = self.list_of[number as usize].clone();
+            let list = self.lists.get(list.start as usize..list.end as usize).unwrap_or_default();
+            *light += interpolate(&self.points, surface, list, &self.received) * scale;
         }
         scratch.rays
     }

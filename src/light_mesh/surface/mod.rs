@@ -8,11 +8,9 @@ mod gathered;
 mod interpolate;
 mod last_place;
 mod mesh;
-mod pixels;
 mod points;
 mod records;
 mod solve;
 mod sources;
 
 pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
-pub use pixels::{PixelGroup, PixelGroups};

@@ -6,10 +6,11 @@ use pulp::NullaryFnOnce;
 use crate::accel::Accel;
 use crate::lights::VisibilityBits;
 use crate::render::frame::BlockIntegrator;
+use crate::render::shadow_edges::{TileVisibility, smooth_shadow_edges};
 use crate::render::stats::{RenderStats, ShadeCounters};
 use crate::render::surface_group::{SurfaceGroup, light_of_seen};
 use crate::render::tiles::Tile;
-use crate::render::trace::{PathVertex, TilePaths};
+use crate::render::trace::TilePaths;
 use crate::simd::{LANES, vectorize};
 use crate::world::World;
 
@@ -24,15 +25,16 @@ pub struct ConventionalIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
     fn evaluate(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(&self, _: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
-        vectorize(Shade { integrator: self, vertices, light })
+    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, paths, light })
     }
 }
 
 /// Shading of a tile, as work for the best instruction set.
 struct Shade<'a, A> {
     integrator: &'a ConventionalIntegrator<'a, A>,
-    vertices: &'a [PathVertex],
+    tile: &'a Tile,
+    paths: &'a TilePaths,
     light: &'a mut [Vec3],
 }
 
@@ -41,14 +43,13 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let ConventionalIntegrator { world: World { accel, lights, .. }, scale } = self.integrator;
-        let chunks = lights.chunks();
+        let Self { integrator, tile, paths, light } = self;
+        let ConventionalIntegrator { world: World { accel, lights, .. }, scale } = integrator;
         let mut shadow_rays = 0;
-        let mut bits: Vec<VisibilityBits> = vec![0; chunks.len() * LANES];
-        for (members, light) in self.vertices.chunks(LANES).zip(self.light.chunks_mut(LANES)) {
-            bits.fill(0);
+        let mut visibility = TileVisibility::new(paths.vertices.len(), lights);
+        for (first, members) in (0..).step_by(LANES).zip(paths.vertices.chunks(LANES)) {
             let mut group = SurfaceGroup::new(members);
-            for (index, chunk) in chunks.iter().enumerate() {
+            for (index, chunk) in lights.chunks().iter().enumerate() {
                 for light in (0..LANES).filter(|light| chunk.used >> light & 1 == 1) {
                     let facing = group.aim(chunk, light);
                     if facing == 0 {
@@ -57,14 +58,16 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
                     shadow_rays += u64::from(facing.count_ones());
                     let seeing = group.seeing(*accel, facing);
                     for point in 0..members.len() {
-                        bits[point * chunks.len() + index] |=
+                        visibility.seen_mut(first + point)[index] |=
                             ((seeing >> point & 1) << light) as VisibilityBits;
                     }
                 }
             }
-            light_of_seen(lights, members, &bits, light);
-            light.iter_mut().for_each(|light| *light *= *scale);
+            let points = first..first + members.len();
+            light_of_seen(lights, members, visibility.rows(points.clone()), &mut light[points]);
         }
+        shadow_rays += smooth_shadow_edges(*accel, lights, tile, paths, &visibility, *scale, light);
+        light.iter_mut().for_each(|light| *light *= *scale);
         ShadeCounters { shadow_rays, ..ShadeCounters::default() }
     }
 }

@@ -13,7 +13,7 @@ use crate::render::meshes::MeshInterpolation;
 use crate::render::need::needed_points;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
-use crate::render::trace::{PathVertex, TilePaths};
+use crate::render::trace::TilePaths;
 use crate::simd::vectorize;
 use crate::world::World;
 
@@ -33,7 +33,7 @@ pub struct LightMeshIntegrator<'a, A> {
 struct Shade<'a, A> {
     integrator: &'a LightMeshIntegrator<'a, A>,
     tile: &'a Tile,
-    vertices: &'a [PathVertex],
+    paths: &'a TilePaths,
     light: &'a mut [Vec3],
 }
 
@@ -42,15 +42,16 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let Self { integrator, tile, vertices, light } = self;
+        let Self { integrator, tile, paths, light } = self;
+        let vertices = &paths.vertices;
         let LightMeshIntegrator { world, direct, indirect, interpolation } = integrator;
         let accel = world.accel;
         let direct = direct.view(world.lights, &interpolation.direct);
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
         if interpolation.hybrid {
-            counters =
-                shade_hybrid(accel, direct, interpolation.tolerance, tile, vertices, &mut scratch, light);
+            let (tolerance, scale) = (interpolation.tolerance, interpolation.direct_scale);
+            counters = shade_hybrid(accel, direct, tolerance, scale, tile, paths, &mut scratch, light);
         } else {
             let mut before = Vec3::NAN;
             for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {
@@ -95,7 +96,7 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         stats.seconds.mesh = seconds;
     }
 
-    fn shade(&self, tile: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
-        vectorize(Shade { integrator: self, tile, vertices, light })
+    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, paths, light })
     }
 }

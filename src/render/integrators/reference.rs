@@ -10,7 +10,7 @@ use crate::light_mesh::points::{AutoSpacing, Kernel, MeshError, Neighbourhoods, 
 use crate::render::frame::BlockIntegrator;
 use crate::render::stats::{RenderStats, ShadeCounters};
 use crate::render::tiles::Tile;
-use crate::render::trace::{PathVertex, TilePaths};
+use crate::render::trace::TilePaths;
 use crate::sampling::{SplitMix64, unit_cube_point};
 use crate::scene::SurfacePoint;
 use crate::settings::{Leaks, Neighbourhood, Settings, ShadingSettings};
@@ -124,14 +124,14 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ReferenceIntegrator<'_, A> {
     fn evaluate(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(&self, _: &Tile, vertices: &[PathVertex], light: &mut [Vec3]) -> ShadeCounters {
+    fn shade(&self, _: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
         let scale = self.shading.direct_scale();
         let mut counters = ShadeCounters::default();
         let mut samples = Samples::default();
         if self.world.lights.is_empty() {
             return counters;
         }
-        for (vertex, light) in vertices.iter().zip(light) {
+        for (vertex, light) in paths.vertices.iter().zip(light) {
             *light = self.illumination(&vertex.surface, &mut samples, &mut counters) * scale;
         }
         counters

@@ -16,26 +16,29 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
+use crate::render::shadow_edges::smooth_shadow_edges;
 use crate::render::stats::ShadeCounters;
 use crate::render::tiles::Tile;
-use crate::render::trace::PathVertex;
+use crate::render::trace::TilePaths;
 
 use patch::Patch;
 use prior::Prior;
 use trace::LightTracer;
 
-/// Shades surface points of a tile: fills `light` with the I of each.
+/// Shades the vertices of a tile: fills `light` with the I of each, which is to be multiplied by `scale`.
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
     mesh: DirectView,
     tolerance: f32,
+    scale: f32,
     tile: &Tile,
-    vertices: &[PathVertex],
+    paths: &TilePaths,
     scratch: &mut LookupScratch,
     light: &mut [Vec3],
 ) -> ShadeCounters {
     let lights = mesh.estimator.lights;
+    let vertices = &paths.vertices;
     if lights.is_empty() || vertices.is_empty() {
         return ShadeCounters::default();
     }
@@ -44,7 +47,9 @@ pub(super) fn shade_hybrid<A: Accel>(
     for patch in &mut patches {
         prior.add(patch, vertices, scratch);
     }
-    let counters = LightTracer::new(accel, lights, tile, &mut patches, &prior).trace(vertices);
+    let mut visibility = prior.visibility(&patches, vertices.len());
+    let mut counters =
+        LightTracer::new(accel, lights, tile, &mut patches, &prior, &mut visibility).trace(vertices);
     for patch in &patches {
         let points = &mut light[patch.vertices.clone()];
         for (lane, light) in points.iter_mut().enumerate() {
@@ -52,5 +57,6 @@ pub(super) fn shade_hybrid<A: Accel>(
             *light = Vec3::from(patch.light.map(|channel| channel[lane])).max(Vec3::ZERO);
         }
     }
+    counters.shadow_rays += smooth_shadow_edges(accel, lights, tile, paths, &visibility, scale, light);
     counters
 }

@@ -4,6 +4,7 @@ use super::patch::Patch;
 use crate::light_mesh::direct::{DirectView, Witnesses};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::lights::VisibilityBits;
+use crate::render::shadow_edges::TileVisibility;
 use crate::render::trace::PathVertex;
 use crate::simd::{LANES, Lanes};
 
@@ -136,6 +137,23 @@ impl<'a> Prior<'a> {
         for (anywhere, open) in self.open_anywhere.iter_mut().zip(&self.open[row..]) {
             *anywhere |= open;
         }
+    }
+
+    /// What is assumed of the vertices of a tile: lights that are open are taken for dark, and weak ones settled.
+    pub fn visibility(&self, patches: &[Patch], vertices: usize) -> TileVisibility {
+        let lights = self.mesh.estimator.lights;
+        let chunks = lights.chunks().len();
+        let mut visibility = TileVisibility::new(vertices, lights);
+        for (number, patch) in patches.iter().enumerate() {
+            let row = number * chunks..(number + 1) * chunks;
+            for vertex in patch.vertices.clone() {
+                visibility.seen_mut(vertex).copy_from_slice(&self.lit[row.clone()]);
+            }
+            for (index, &weak) in self.weak[row].iter().enumerate().filter(|(_, weak)| **weak != 0) {
+                visibility.settle(patch.vertices.clone(), index, weak);
+            }
+        }
+        visibility
     }
 
     /// The share of open lights among those that any mesh point sees, over all patches.

@@ -6,6 +6,7 @@ use super::prior::{Assumption, Prior};
 use super::strengths::strengths;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::lights::PackedLights;
+use crate::render::shadow_edges::TileVisibility;
 use crate::render::stats::{HybridError, ShadeCounters};
 use crate::render::tiles::{TILE, Tile};
 use crate::render::trace::PathVertex;
@@ -72,6 +73,8 @@ pub struct LightTracer<'a, A> {
     tile: &'a Tile,
     patches: &'a mut [Patch],
     prior: &'a Prior<'a>,
+    /// What is known of all lights.
+    visibility: &'a mut TileVisibility,
     views: Vec<View>,
     /// The patches along a Morton curve, so that those that follow each other are neighbours.
     order: Vec<u32>,
@@ -91,6 +94,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
         tile: &'a Tile,
         patches: &'a mut [Patch],
         prior: &'a Prior<'a>,
+        visibility: &'a mut TileVisibility,
     ) -> Self {
         let views = vec![View::new(Assumption::Dark); patches.len()];
         let mut order: Vec<u32> = (0..patches.len() as u32).collect();
@@ -101,6 +105,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             tile,
             patches,
             prior,
+            visibility,
             views,
             order,
             checks: Vec::new(),
@@ -194,6 +199,9 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             };
             if changed != 0 {
                 patch.add_to(changed, sign, self.lights, index, light);
+                for lane in (0..patch.vertices.len()).filter(|lane| changed >> lane & 1 == 1) {
+                    self.visibility.seen_mut(patch.vertices.start + lane)[index] ^= 1 << light;
+                }
             }
         }
     }

@@ -4,11 +4,13 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
-use super::values::{Count, Fraction, Stops};
+use super::values::{Count, FilterWidth, Fraction, Stops};
 use crate::image::MAX_PIXELS;
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
-use crate::settings::{Estimator, IndirectSettings, Integrator, Radius, Resolve, Settings, named_enum};
+use crate::settings::{
+    Estimator, IndirectSettings, Integrator, PixelFilter, Radius, Resolve, Settings, named_enum,
+};
 
 /// `[render]`
 #[derive(Default, Deserialize)]
@@ -18,6 +20,8 @@ pub struct RenderTable {
     reference_samples: Option<Count<65_536>>,
     resolution: Option<Spanned<[Count<65_536>; 2]>>,
     spp: Option<Count<65_536>>,
+    filter: Option<PixelFilter>,
+    filter_width: Option<FilterWidth>,
     max_depth: Option<Count<1_000>>,
     weight_threshold: Option<Fraction>,
     exposure: Option<Stops>,
@@ -68,6 +72,8 @@ impl RenderTable {
         shading.reference_samples = self.reference_samples.map_or(shading.reference_samples, |count| count.0);
         shading.lambertian = self.lambertian.unwrap_or(shading.lambertian);
         view.samples_per_pixel = self.spp.map_or(view.samples_per_pixel, |count| count.0);
+        view.filter = self.filter.unwrap_or(view.filter);
+        view.filter_width = self.filter_width.map_or(view.filter_width, |width| Some(width.0));
         view.max_depth = self.max_depth.map_or(view.max_depth, |count| count.0);
         view.weight_threshold = self.weight_threshold.map_or(view.weight_threshold, |weight| weight.0);
         output.exposure = self.exposure.map_or(output.exposure, |stops| stops.0);

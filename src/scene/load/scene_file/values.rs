@@ -104,6 +104,9 @@ number!(
     /// Degrees in (0, 180).
     FieldOfView, |x| x > 0.0 && x < 180.0, "lie in (0, 180)");
 number!(
+    /// Pixels of a filter, in (0, 16].
+    FilterWidth, |x| x > 0.0 && x <= crate::settings::MAX_FILTER_WIDTH, "lie in (0, 16]");
+number!(
     /// Stops in [−100, 100].
     Stops, |x| x.abs() <= crate::settings::MAX_EXPOSURE, "lie in [-100, 100]");
 

@@ -1,0 +1,247 @@
+//! Samples of a pixel that see the same surface make one vertex: light is computed once for all of them (method §9).
+
+use glam::Vec3;
+
+use super::trace::{PathVertex, TilePaths};
+use crate::scene::{PixelFootprint, SurfacePoint};
+
+/// Number of no vertex.
+const NONE: u32 = u32::MAX;
+/// Cosine between normals of samples that are merged.
+const SAME_WAY: f32 = 0.98;
+/// Edges of a pixel between merged samples: along the normal, and in all.
+const HEIGHT: f32 = 0.5;
+const WAY: f32 = 16.0;
+/// Difference in brightness, as a share of the brighter, from which on one surface counts for two.
+const CONTRAST: f32 = 0.1;
+
+/// What one sample sees, or several that are known to see the same.
+#[derive(Clone, Copy)]
+pub struct Seen {
+    /// The surface point: of several samples their middle.
+    pub surface: SurfacePoint,
+    /// k_d times the product of the k_s before it, summed over the samples.
+    pub reflectance: Vec3,
+    /// What reaches the pixel of the surface's own radiance, summed over the samples.
+    pub emission: Vec3,
+    /// Pixel within the tile.
+    pub pixel: u32,
+    /// Number of samples.
+    pub samples: u32,
+}
+
+impl Seen {
+    /// How bright a sample is, if light of 1 falls on it.
+    fn brightness(&self) -> Vec3 {
+        (self.reflectance + self.emission) / self.samples as f32
+    }
+}
+
+/// Samples of some pixels, to be merged.
+pub struct SampleMerger {
+    footprint: PixelFootprint,
+    /// Whether pixels have no more than one sample each.
+    single: bool,
+    seen: Vec<Seen>,
+    /// Where rays of the samples start, in the order of `seen`.
+    origins: Vec<Vec3>,
+    groups: Vec<Group>,
+    /// Group of each sample.
+    group_of: Vec<u32>,
+    /// The last group of each pixel.
+    last_of: Vec<u32>,
+}
+
+/// Samples of one pixel in about the same plane.
+struct Group {
+    first: SurfacePoint,
+    brightness: Vec3,
+    /// Whether it has parts of different brightness.
+    is_mixed: bool,
+    /// Edge of a pixel there.
+    edge: f32,
+    positions: Vec3,
+    normals: Vec3,
+    count: u32,
+    /// Squared distance from the middle of the sample that is nearest to it.
+    nearest: f32,
+    vertex: PathVertex,
+    /// The group of the pixel before it.
+    before: u32,
+    /// Number of groups of the pixel before it.
+    rank: u32,
+}
+
+impl SampleMerger {
+    /// Of a tile of so many pixels with so many samples each.
+    pub fn new(footprint: PixelFootprint, pixels: usize, samples: u32) -> Self {
+        let single = samples == 1;
+        let last_of = if single { Vec::new() } else { vec![NONE; pixels] };
+        let (seen, origins, groups, group_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { footprint, single, seen, origins, groups, group_of, last_of }
+    }
+
+    /// Whether samples that lie within `way` of their middle, which sees a surface point, may stand together.
+    #[inline(always)]
+    pub fn is_narrow(&self, surface: &SurfacePoint, way: f32) -> bool {
+        way < 0.5 * WAY * self.footprint.edge_at(surface.position)
+    }
+
+    /// Adds what samples see, and where their rays start.
+    #[inline(always)]
+    pub fn add(&mut self, seen: Seen, origins: impl IntoIterator<Item = Vec3>, paths: &mut TilePaths) {
+        if self.single {
+            let Seen { surface, reflectance, pixel, samples, .. } = seen;
+            paths.vertices.push(PathVertex { surface, reflectance, pixel, first_sample: 0, samples });
+        } else {
+            self.seen.push(seen);
+            self.origins.extend(origins);
+        }
+    }
+
+    /// Turns the samples that were added since the last time into vertices, in the order in which their first samples were added. A
+    /// pixel's vertices don't depend on other pixels.
+    ///
+    /// The sample nearest to the middle of all stands for them: the middle itself may lie below a surface that isn't flat. First come the
+    /// pixels' first vertices, then their second ones: those that follow each other should be neighbours.
+    #[inline(always)]
+    pub fn finish(&mut self, paths: &mut TilePaths) {
+        if self.seen.is_empty() {
+            return;
+        }
+        self.group_all();
+        let Self { seen, origins, groups, group_of, .. } = self;
+        let mut first_sample = paths.origins.len() as u32;
+        for group in &mut *groups {
+            group.vertex.first_sample = first_sample;
+            group.positions /= group.count as f32;
+            first_sample += group.count;
+        }
+        paths.origins.resize(first_sample as usize, Vec3::ZERO);
+        let mut left = &origins[..];
+        for (seen, &group) in seen.iter().zip(&*group_of) {
+            let Group { positions: middle, nearest, vertex, .. } = &mut groups[group as usize];
+            let (own, others) = left.split_at(seen.samples as usize);
+            left = others;
+            paths.origins[(vertex.first_sample + vertex.samples) as usize..][..own.len()]
+                .copy_from_slice(own);
+            vertex.samples += seen.samples;
+            let distance = seen.surface.position.distance_squared(*middle);
+            if distance < *nearest {
+                *nearest = distance;
+                vertex.surface = seen.surface;
+            }
+            self.last_of[seen.pixel as usize] = NONE;
+        }
+        let (mut rank, mut left) = (0, groups.len());
+        while left > 0 {
+            for group in groups.iter_mut().filter(|group| group.rank == rank) {
+                if group.count > 1 {
+                    group.vertex.surface.shading_normal = group.normals.normalize();
+                }
+                paths.vertices.push(group.vertex);
+                left -= 1;
+            }
+            rank += 1;
+        }
+        (seen.clear(), origins.clear(), groups.clear(), group_of.clear());
+    }
+
+    /// Whether samples of a pixel that were added since the last vertices see more than one surface, one of several colours, or the background
+    /// beside one; it has so many samples.
+    #[inline(always)]
+    pub fn is_mixed(&mut self, pixel: u32, samples: u32) -> bool {
+        self.group_all();
+        let last = self.last_of.get(pixel as usize).and_then(|&last| self.groups.get(last as usize));
+        last.is_some_and(|last| last.rank > 0 || last.is_mixed || last.count < samples)
+    }
+
+    /// Finds the groups of samples that have none yet.
+    #[inline(always)]
+    fn group_all(&mut self) {
+        for seen in &self.seen[self.group_of.len()..] {
+            let group = Self::group(&mut self.groups, &mut self.last_of, &self.footprint, seen);
+            self.group_of.push(group);
+        }
+    }
+
+    /// Adds samples to the group that they belong to, and returns the group's number.
+    #[inline(always)]
+    fn group(groups: &mut Vec<Group>, last_of: &mut [u32], footprint: &PixelFootprint, seen: &Seen) -> u32 {
+        let &Seen { surface, reflectance, pixel, samples, .. } = seen;
+        let brightness = seen.brightness();
+        let last = &mut last_of[pixel as usize];
+        let (mut number, mut rank) = (*last, 0);
+        while let Some(group) = groups.get(number as usize) {
+            let way = surface.position - group.first.position;
+            if group.first.shading_normal.dot(surface.shading_normal) > SAME_WAY
+                && way.dot(group.first.geometric_normal).abs() < HEIGHT * group.edge
+                && way.length_squared() < (WAY * group.edge) * (WAY * group.edge)
+            {
+                break;
+            }
+            number = group.before;
+            rank += 1;
+        }
+        if number == NONE {
+            number = groups.len() as u32;
+            groups.push(Group {
+                first: surface,
+                brightness,
+                is_mixed: false,
+                edge: footprint.edge_at(surface.position),
+                positions: Vec3::ZERO,
+                normals: Vec3::ZERO,
+                count: 0,
+                nearest: f32::INFINITY,
+                vertex: PathVertex { surface, reflectance: Vec3::ZERO, pixel, first_sample: 0, samples: 0 },
+                before: *last,
+                rank,
+            });
+            *last = number;
+        }
+        let group = &mut groups[number as usize];
+        let contrast = (group.brightness - brightness).abs() - CONTRAST * group.brightness.max(brightness);
+        group.is_mixed |= contrast.max_element() > 0.0;
+        group.positions += surface.position * samples as f32;
+        group.normals += surface.shading_normal * samples as f32;
+        group.vertex.reflectance += reflectance;
+        group.count += samples;
+        number
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of a pixel in a plane are one vertex, whatever lies between them in the list, and the middle one stands for them; other planes,
+    /// other sides and other pixels have their own.
+    #[test]
+    fn a_vertex_is_a_plane_in_a_pixel() {
+        let footprint = PixelFootprint { eye: Vec3::Y * 10.0, edge: 0.01 };
+        let mut merger = SampleMerger::new(footprint, 2, 16);
+        let mut paths = TilePaths::default();
+        let up = Vec3::Y;
+        for (pixel, x, y, normal) in [
+            (0, 0.0, 0.0, up),
+            (1, 0.1, 0.0, up),
+            (0, 0.0, 0.0, -up),
+            (0, 0.03, 0.0, up),
+            (0, 0.0, 1.0, up),
+            (0, 0.02, 0.0, up),
+            (0, 9.0, 0.0, up),
+        ] {
+            let surface = SurfacePoint::flat(Vec3::new(x, y, 0.0), normal);
+            let seen =
+                Seen { surface, reflectance: Vec3::splat(0.5), emission: Vec3::ZERO, pixel, samples: 1 };
+            merger.add(seen, [surface.position], &mut paths);
+        }
+        merger.finish(&mut paths);
+        let found: Vec<_> = paths.vertices.iter().map(|v| (v.pixel, v.samples, v.reflectance.x)).collect();
+        assert_eq!(found, [(0, 3, 1.5), (1, 1, 0.5), (0, 1, 0.5), (0, 1, 0.5), (0, 1, 0.5)]);
+        assert_eq!(paths.vertices[0].surface.position.x, 0.02);
+        let origins: Vec<f32> = paths.origins_of(&paths.vertices[0]).iter().map(|origin| origin.x).collect();
+        assert_eq!(origins, [0.0, 0.03, 0.02]);
+    }
+}
