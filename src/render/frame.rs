@@ -47,11 +47,14 @@ impl StopToken {
     }
 }
 
-/// Samples per block: enough to keep all threads busy and packets full, at some 70 bytes of path each.
+/// Samples per block: enough to keep all threads busy and packets full, at 12 bytes each and some 70 per surface point.
 const BLOCK_SAMPLES: u64 = 1 << 18;
 
-/// Camera paths are kept until they are shaded up to this many samples per image, some two gigabytes; beyond, they are traced
-/// a second time, and counted twice.
+/// Pixels per block at least, where pixels have many samples: at the end of a block threads wait for the last tile.
+const LEAST_BLOCK: u64 = 1 << 16;
+
+/// Camera paths are kept until they are shaded up to this many samples per image, from half a gigabyte where pixels have many samples to two where
+/// they have one; beyond, they are traced a second time, and counted twice.
 const KEPT_SAMPLES: u64 = 1 << 25;
 
 /// What is rendered: a view of a world, and who receives it.
@@ -78,7 +81,9 @@ impl<'a, A: Accel> Frame<'a, A> {
         stop: &'a StopToken,
     ) -> Self {
         let camera = CameraRays::new(camera, view.resolution, 1).with_samples(view.samples());
-        let block_pixels = view.block_samples.unwrap_or(BLOCK_SAMPLES) / u64::from(view.samples_per_pixel);
+        let samples = u64::from(view.samples_per_pixel);
+        let block_pixels =
+            view.block_samples.map_or((BLOCK_SAMPLES / samples).max(LEAST_BLOCK), |most| most / samples);
         let blocks = blocks(view.resolution, block_pixels);
         Self { world, view, camera, blocks, sink, stop, kept: Vec::new() }
     }

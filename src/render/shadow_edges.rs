@@ -34,7 +34,13 @@ impl TileVisibility {
         &self.seen[vertex * self.chunks..][..self.chunks]
     }
 
-    /// The same, to be changed.
+    /// Whether a vertex sees a light.
+    #[inline(always)]
+    fn sees(&self, vertex: usize, (index, number): ChunkLight) -> bool {
+        self.seen(vertex)[index] >> number & 1 == 1
+    }
+
+    /// The same as [`Self::seen`], to be changed.
     #[inline(always)]
     pub fn seen_mut(&mut self, vertex: usize) -> &mut [VisibilityBits] {
         &mut self.seen[vertex * self.chunks..][..self.chunks]
@@ -94,29 +100,21 @@ pub(super) fn smooth_shadow_edges<A: Accel>(
     for (edge, settled) in at_edge.iter_mut().zip(settled) {
         *edge &= !settled;
     }
-    let mut edges = Edges {
-        accel,
-        lights,
-        paths,
-        asked: Vec::new(),
-        rays: 0,
-        totals: totals(paths, light, scale),
-        scale,
-    };
-    // What lies beyond the border of the tile is not known: there the outermost sample tells, for lights that have an edge in the tile.
     let mut anywhere: Vec<VisibilityBits> = vec![0; *chunks];
     for row in at_edge.chunks_exact(*chunks) {
         for (anywhere, edge) in anywhere.iter_mut().zip(row) {
             *anywhere |= edge;
         }
     }
-    edges.find_at_border(&surfaces, &anywhere, visibility, &mut at_edge);
-    for index in 0..*chunks {
-        let mut left = anywhere[index];
+    let totals = totals(paths, light, scale);
+    let mut edges = Edges { accel, lights, paths, visibility, asked: Vec::new(), rays: 0, totals, scale };
+    for (index, mut left) in anywhere.into_iter().enumerate() {
         while left != 0 {
-            let number = left.trailing_zeros() as usize % LANES;
+            let of = (index, left.trailing_zeros() as usize);
             left &= left - 1;
-            edges.smooth((index, number), visibility, &at_edge, light);
+            // What lies beyond the border of the tile is not known.
+            edges.find_at_border(of, &surfaces.at_border, &mut at_edge);
+            edges.smooth(of, &at_edge, light);
         }
     }
     edges.rays
@@ -211,16 +209,22 @@ struct Asked {
     vertex: u32,
     /// What the light's intensity is multiplied by.
     factor: f32,
+    /// The first of the samples that are asked; the others follow at equal steps.
+    first: u32,
     /// Rays, and how many of them see the light.
     rays: u32,
     seeing: u32,
 }
+
+/// A light by the index of its chunk and its number there.
+type ChunkLight = (usize, usize);
 
 /// Asking samples about lights.
 struct Edges<'a, A> {
     accel: &'a A,
     lights: &'a PackedLights,
     paths: &'a TilePaths,
+    visibility: &'a TileVisibility,
     asked: Vec<Asked>,
     rays: u64,
     /// Light of each pixel, see [`totals`].
@@ -231,48 +235,69 @@ struct Edges<'a, A> {
 impl<A: Accel> Edges<'_, A> {
     /// Smooths the edges of one light.
     #[inline(always)]
-    fn smooth(
-        &mut self,
-        (index, number): (usize, usize),
-        visibility: &TileVisibility,
-        at_edge: &[VisibilityBits],
-        light: &mut [Vec3],
-    ) {
-        let chunks = visibility.chunks;
+    fn smooth(&mut self, of: ChunkLight, at_edge: &[VisibilityBits], light: &mut [Vec3]) {
+        let (index, number) = of;
         let intensity = Vec3::from(self.lights.intensity(index, number));
         self.asked.clear();
-        for (vertex, edges) in at_edge.chunks_exact(chunks).enumerate() {
+        for (vertex, edges) in at_edge.chunks_exact(self.visibility.chunks).enumerate() {
             if edges[index] >> number & 1 == 0 {
                 continue;
             }
-            let is_seen = visibility.seen(vertex)[index] >> number & 1 == 1;
-            let (factor, share) = self.share(vertex, (index, number), intensity, is_seen);
+            let (factor, share) = self.share(vertex, of);
             if share < LEAST_SHARE {
                 continue;
             }
             let rays = ((share / SHARE_OF_SAMPLE).ceil() as u32).min(self.paths.vertices[vertex].samples);
-            self.asked.push(Asked { vertex: vertex as u32, factor, rays, seeing: 0 });
+            // Others for each light.
+            let first = number as u32;
+            self.asked.push(Asked { vertex: vertex as u32, factor, first, rays, seeing: 0 });
         }
-        self.trace((index, number));
+        self.trace(of);
         for asked in &self.asked {
             let vertex = asked.vertex as usize;
-            let before = f32::from(visibility.seen(vertex)[index] >> number & 1);
+            let before = if self.visibility.sees(vertex, of) { 1.0 } else { 0.0 };
             let part = asked.seeing as f32 / asked.rays as f32;
             light[vertex] = (light[vertex] + intensity * (asked.factor * (part - before))).max(Vec3::ZERO);
         }
     }
 
+    /// Asks the outermost samples of vertices at the border of the tile for a light that has an edge in the tile, and adds the edges that they
+    /// find.
+    #[inline(always)]
+    fn find_at_border(&mut self, of: ChunkLight, at_border: &[(u32, u32)], at_edge: &mut [VisibilityBits]) {
+        let (index, number) = of;
+        let TileVisibility { chunks, settled, .. } = self.visibility;
+        let vertices = &self.paths.vertices;
+        self.asked.clear();
+        for &(vertex, inner) in at_border {
+            let at = vertex as usize * chunks + index;
+            let known = at_edge[at] | settled.get(at).copied().unwrap_or(0);
+            if known >> number & 1 == 1 || self.share(vertex as usize, of).1 < LEAST_SHARE {
+                continue;
+            }
+            let outer = &vertices[vertex as usize];
+            let middle = outer.surface.position;
+            let outwards = middle - vertices[inner as usize].surface.position;
+            let along = |origin: &Vec3| (*origin - middle).dot(outwards);
+            let origins = self.paths.origins_of(outer).iter().map(along).enumerate();
+            let outermost = origins.max_by(|(_, a), (_, b)| a.total_cmp(b));
+            let first = outermost.map_or(0, |(first, _)| first as u32);
+            self.asked.push(Asked { vertex, factor: 0.0, first, rays: 1, seeing: 0 });
+        }
+        self.trace(of);
+        for asked in &self.asked {
+            let differs = (asked.seeing == 1) != self.visibility.sees(asked.vertex as usize, of);
+            at_edge[asked.vertex as usize * chunks + index] |= VisibilityBits::from(differs) << number;
+        }
+    }
+
     /// What a light's intensity is multiplied by at a vertex, and its share of the pixel's light.
     #[inline(always)]
-    fn share(
-        &self,
-        vertex: usize,
-        (index, number): (usize, usize),
-        intensity: Vec3,
-        is_seen: bool,
-    ) -> (f32, f32) {
+    fn share(&self, vertex: usize, of: ChunkLight) -> (f32, f32) {
+        let is_seen = self.visibility.sees(vertex, of);
         let vertex = &self.paths.vertices[vertex];
-        let factor = self.lights.factor(index, number, &vertex.surface);
+        let intensity = Vec3::from(self.lights.intensity(of.0, of.1));
+        let factor = self.lights.factor(of.0, of.1, &vertex.surface);
         let part = vertex.reflectance.dot(intensity) * (factor * self.scale);
         let total = self.totals[vertex.pixel as usize] + if is_seen { 0.0 } else { part };
         (factor, if total > 0.0 { part / total } else { 0.0 })
@@ -280,17 +305,16 @@ impl<A: Accel> Edges<'_, A> {
 
     /// Traces the rays that are asked for towards a light.
     #[inline(always)]
-    fn trace(&mut self, (index, number): (usize, usize)) {
+    fn trace(&mut self, (index, number): ChunkLight) {
         let chunk = &self.lights.chunks()[index];
         let mut packet = RayPacket::<LANES>::empty();
         let mut owners = [0usize; LANES];
         let mut filled = 0;
         for at in 0..self.asked.len() {
-            let Asked { vertex, rays, .. } = self.asked[at];
+            let Asked { vertex, first, rays, .. } = self.asked[at];
             let origins = self.paths.origins_of(&self.paths.vertices[vertex as usize]);
             for ray in 0..rays as usize {
-                // Evenly over the samples, and others for each light.
-                let origin = origins[(ray * origins.len() / rays as usize + number) % origins.len()];
+                let origin = origins[(ray * origins.len() / rays as usize + first as usize) % origins.len()];
                 set_ray(&mut packet, filled, origin, chunk.to_light(number, origin.to_array()));
                 owners[filled] = at;
                 filled += 1;
@@ -313,61 +337,7 @@ impl<A: Accel> Edges<'_, A> {
         let blocked = self.accel.occluded_packet(active, packet, Coherence::Coherent);
         self.rays += owners.len() as u64;
         for (lane, &owner) in owners.iter().enumerate() {
-            self.asked[owner].seeing += u32::from(!blocked >> lane & 1);
-        }
-    }
-
-    /// Asks the outermost samples of vertices at the border of the tile for lights that have an edge anywhere, and adds the edges that they find.
-    #[inline(always)]
-    fn find_at_border(
-        &mut self,
-        surfaces: &Neighbours,
-        anywhere: &[VisibilityBits],
-        visibility: &TileVisibility,
-        at_edge: &mut [VisibilityBits],
-    ) {
-        let chunks = visibility.chunks;
-        let vertices = &self.paths.vertices;
-        for (index, anywhere) in anywhere.iter().enumerate() {
-            let mut left = *anywhere;
-            while left != 0 {
-                let number = left.trailing_zeros() as usize % LANES;
-                left &= left - 1;
-                let intensity = Vec3::from(self.lights.intensity(index, number));
-                let chunk = &self.lights.chunks()[index];
-                let mut packet = RayPacket::<LANES>::empty();
-                let mut owners = [0usize; LANES];
-                let mut filled = 0;
-                self.asked.clear();
-                for &(vertex, inner) in &surfaces.at_border {
-                    let vertex = vertex as usize;
-                    let settled = visibility.settled.get(vertex * chunks + index).copied().unwrap_or(0);
-                    let known = (at_edge[vertex * chunks + index] | settled) >> number & 1 == 1;
-                    let is_seen = visibility.seen(vertex)[index] >> number & 1 == 1;
-                    if known || self.share(vertex, (index, number), intensity, is_seen).1 < LEAST_SHARE {
-                        continue;
-                    }
-                    let middle = vertices[vertex].surface.position;
-                    let outwards = middle - vertices[inner as usize].surface.position;
-                    let along = |origin: &&Vec3| (**origin - middle).dot(outwards);
-                    let origins = self.paths.origins_of(&vertices[vertex]).iter();
-                    let Some(origin) = origins.max_by(|a, b| along(a).total_cmp(&along(b))) else { continue };
-                    set_ray(&mut packet, filled, *origin, chunk.to_light(number, origin.to_array()));
-                    owners[filled] = self.asked.len();
-                    self.asked.push(Asked { vertex: vertex as u32, factor: 0.0, rays: 1, seeing: 0 });
-                    filled += 1;
-                    if filled == LANES {
-                        self.send(&mut packet, &owners);
-                        filled = 0;
-                    }
-                }
-                self.send(&mut packet, &owners[..filled]);
-                for asked in &self.asked {
-                    let at = asked.vertex as usize * chunks + index;
-                    let differs = asked.seeing as VisibilityBits ^ (visibility.seen[at] >> number & 1);
-                    at_edge[at] |= differs << number;
-                }
-            }
+            self.asked[owner].seeing += u32::from(!blocked >> lane & 1 == 1);
         }
     }
 }

@@ -25,17 +25,24 @@ fn at(image: &Image, x: u32, y: u32) -> f32 {
     image.pixels()[(y * SIDE + x) as usize][0]
 }
 
-/// Share of a pixel's area where the floor lies beyond an edge, which leads along (cos, sin) in x and z through a point: by 64 × 64 samples.
+/// Share of a pixel's area where the floor lies beyond an edge, which leads along (cos, sin) in x and z through a point: by 64 × 64 samples where it crosses the
+/// pixel.
 fn coverage(camera: &Camera, x: u32, y: u32, height: f32, edge: (Vec2, f32)) -> f32 {
     const FINE: u32 = 64;
     let rays = CameraRays::new(camera, (SIDE * FINE, SIDE * FINE), 1);
     let (normal, distance) = edge;
-    let beyond = |i: u32| {
-        let ray = rays.ray(x * FINE + i % FINE, y * FINE + i / FINE, 0);
+    let beyond = |i: u32, j: u32| {
+        let ray = rays.ray(x * FINE + i, y * FINE + j, 0);
         let at = ray.origin + ray.direction * ((height - ray.origin.y) / ray.direction.y);
-        u32::from(normal.dot(Vec2::new(at.x, at.z)) > distance)
+        normal.dot(Vec2::new(at.x, at.z)) > distance
     };
-    (0..FINE * FINE).map(beyond).sum::<u32>() as f32 / (FINE * FINE) as f32
+    let last = FINE - 1;
+    let corners = [(0, last), (last, 0), (last, last)];
+    if corners.iter().all(|&(i, j)| beyond(i, j) == beyond(0, 0)) {
+        return f32::from(u8::from(beyond(0, 0)));
+    }
+    let part = (0..FINE * FINE).filter(|i| beyond(i % FINE, i / FINE)).count();
+    part as f32 / (FINE * FINE) as f32
 }
 
 /// A large floor, with a half plane of another material at a height above it, beyond an edge.
