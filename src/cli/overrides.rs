@@ -61,6 +61,11 @@ pub struct Overrides {
 pub struct Bounces(pub u32);
 
 impl Overrides {
+    /// The conventional tracer, whatever the scene file says.
+    pub fn conventional() -> Self {
+        Self { integrator: Some(Integrator::Conventional), ..Self::default() }
+    }
+
     /// Replaces the settings that flags were given for.
     pub fn apply(&self, settings: &mut Settings) {
         self.apply_to_direct_light(settings);

@@ -31,9 +31,21 @@ pub struct ListedImage {
     /// Models that are not part of the project, relative to the list; where one is missing, the image is not rendered.
     #[serde(default)]
     needs: Vec<PathBuf>,
+    /// Whether the same by the conventional tracer stands beside it.
+    #[serde(default)]
+    pub conventional: bool,
 }
 
+/// What is added to the names of the files of the same image by the conventional tracer.
+pub const CONVENTIONAL: &str = "-conventional";
+
 impl ListedImage {
+    /// Names of its files, each with whether it is the one by the conventional tracer.
+    pub fn files(&self) -> impl Iterator<Item = (String, bool)> {
+        let beside = self.conventional.then(|| (format!("{}{CONVENTIONAL}", self.name), true));
+        std::iter::once((self.name.clone(), false)).chain(beside)
+    }
+
     /// The first of the models that it needs and that is not in the list's folder.
     pub fn missing(&self, folder: &Path) -> Option<PathBuf> {
         self.needs.iter().map(|model| folder.join(model)).find(|model| !model.exists())
@@ -53,6 +65,11 @@ impl Gallery {
             if name.is_empty() || !name.chars().all(plain) {
                 let problem =
                     format!("picture[{index}].name: letters, digits, - and _ make a name, found `{name}`");
+                return Err(malformed(problem));
+            }
+            if name.ends_with(CONVENTIONAL) {
+                let problem =
+                    format!("picture[{index}].name: `{CONVENTIONAL}` is added to names, found `{name}`");
                 return Err(malformed(problem));
             }
             if gallery.images.iter().take(index).any(|other| other.name == *name) {

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use self::list::read;
-use self::page::{Entry, html, markdown};
+use self::page::{Entry, Picture, html, markdown};
 use super::error::{CommandError, Outcome};
+use super::overrides::Overrides;
 use super::render::{RenderArgs, run as render};
 use super::shared::{BackendArgs, QuietArgs, SceneArgs};
 use crate::image::OutputFile;
@@ -19,11 +20,11 @@ pub use self::list::{Gallery, ListedImage};
 
 /// What `gallery` takes.
 ///
-/// Each image gets NAME.png and NAME.json (what was counted and measured) in the output folder; page.md and index.html
-/// show all images of the list that are there.
+/// Each image gets NAME.png and NAME.json (what was counted and measured) in the output folder, and NAME-conventional.png and .json where the list asks
+/// for the conventional tracer's beside it; page.md and index.html show all images of the list that are there.
 #[derive(Args, Clone, Debug)]
 pub struct GalleryArgs {
-    /// The list: a TOML file of `[[picture]]` tables with name, title, scene and caption, and perhaps models that it needs
+    /// The list: a TOML file of `[[picture]]` tables with name, title, scene and caption, perhaps models that it needs, and whether it is rendered conventionally too
     #[arg(long, value_name = "FILE", default_value = "scenes/gallery.toml")]
     list: PathBuf,
     /// Folder to write into, created if need be
@@ -44,34 +45,43 @@ impl GalleryArgs {
         self.out.join(format!("{name}.{extension}"))
     }
 
-    /// What an image is rendered with.
-    fn render_args(&self, image: &ListedImage, folder: &Path) -> RenderArgs {
+    /// What a file of an image is rendered with.
+    fn render_args(&self, image: &ListedImage, name: &str, conventional: bool, folder: &Path) -> RenderArgs {
         RenderArgs {
             scene: SceneArgs { path: folder.join(&image.scene) },
-            output: vec![self.file(&image.name, "png")],
-            stats: Some(self.file(&image.name, "json")),
+            output: vec![self.file(name, "png")],
+            stats: Some(self.file(name, "json")),
             quiet: self.quiet,
             backend: self.backend,
+            overrides: if conventional { Overrides::conventional() } else { Overrides::default() },
             ..RenderArgs::default()
         }
     }
 
     /// What the page shows of an image; `None` where the image isn't there.
     fn entry(&self, image: ListedImage, folder: &Path) -> Result<Option<Entry>, CommandError> {
-        let (png, stats) = (self.file(&image.name, "png"), self.file(&image.name, "json"));
-        if !(png.exists() && stats.exists()) {
-            return Ok(None);
+        let mut pictures = Vec::new();
+        for (name, _) in image.files() {
+            let (png, stats) = (self.file(&name, "png"), self.file(&name, "json"));
+            if !(png.exists() && stats.exists()) {
+                continue;
+            }
+            let malformed = |error: serde_json::Error| CommandError::Malformed {
+                file: stats.clone(),
+                problem: format!("not what was written there: {error}"),
+            };
+            pictures.push(Picture { name, stats: serde_json::from_str(&read(&stats)?).map_err(malformed)? });
         }
-        let scene = folder.join(&image.scene);
-        let malformed = |error: serde_json::Error| CommandError::Malformed {
-            file: stats.clone(),
-            problem: format!("not what was written there: {error}"),
+        let mut pictures = pictures.into_iter();
+        let Some(picture) = pictures.next().filter(|picture| picture.name == image.name) else {
+            return Ok(None);
         };
+        let scene = folder.join(&image.scene);
         Ok(Some(Entry {
             scene_path: scene.to_string_lossy().into_owned(),
             scene_text: read(&scene)?,
-            stats: serde_json::from_str(&read(&stats)?).map_err(malformed)?,
-            png: fs::read(&png).map_err(|source| CommandError::Read { file: png, source })?,
+            picture,
+            beside: pictures.next(),
             image,
         }))
     }
@@ -106,7 +116,9 @@ pub fn run(args: &GalleryArgs) -> Result<Outcome, CommandError> {
             continue;
         }
         reporter.line(&format!("{}:", image.name));
-        render(&args.render_args(image, folder))?;
+        for (name, conventional) in image.files() {
+            render(&args.render_args(image, &name, conventional, folder))?;
+        }
     }
 
     let mut entries = Vec::new();

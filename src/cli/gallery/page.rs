@@ -1,9 +1,7 @@
-//! The pages of a gallery: Markdown, and HTML that holds its images.
+//! The pages of a gallery: Markdown and HTML.
 
 use std::fmt::Write as _;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::Value;
 
 use super::list::ListedImage;
@@ -16,10 +14,25 @@ pub struct Entry {
     pub scene_path: String,
     /// The scene file.
     pub scene_text: String,
+    /// The image.
+    pub picture: Picture,
+    /// The same by the conventional tracer.
+    pub beside: Option<Picture>,
+}
+
+/// An image file and what was counted and measured.
+pub struct Picture {
+    /// Name of the file.
+    pub name: String,
     /// The statistics of the render.
     pub stats: Value,
-    /// The image file.
-    pub png: Vec<u8>,
+}
+
+impl Picture {
+    /// Seconds from reading the scene to the written image.
+    fn seconds(&self) -> f64 {
+        self.stats.pointer("/seconds/total").and_then(Value::as_f64).unwrap_or(0.0)
+    }
 }
 
 const TITLE: &str = "Gallery";
@@ -27,12 +40,16 @@ const INTRODUCTION: &str = "Every picture is rendered by `lightmesh gallery` fro
 Seconds are wall-clock time from reading the scene to the written picture, and differ from machine to machine; mesh points \
 and rays do not.";
 
+/// What stands beside some images.
+const BESIDE: &str = "conventional tracing";
+const BELOW: &str = " Below it the same by conventional tracing.";
+
 impl Entry {
     /// Name and value of what was counted and measured.
     fn facts(&self) -> Vec<(&'static str, String)> {
-        let count = |pointer: &str| self.stats.pointer(pointer).and_then(Value::as_u64).unwrap_or(0);
-        let text = |pointer: &str| self.stats.pointer(pointer).and_then(Value::as_str).unwrap_or("?");
-        let seconds = self.stats.pointer("/seconds/total").and_then(Value::as_f64).unwrap_or(0.0);
+        let count = |pointer: &str| self.picture.stats.pointer(pointer).and_then(Value::as_u64).unwrap_or(0);
+        let text = |pointer: &str| self.picture.stats.pointer(pointer).and_then(Value::as_str).unwrap_or("?");
+        let seconds = self.picture.seconds();
         let mut facts = vec![
             (
                 "size",
@@ -57,6 +74,9 @@ impl Entry {
                 ),
             ),
         ];
+        if let Some(beside) = &self.beside {
+            facts.push(("seconds, conventionally", format!("{:.2}", beside.seconds())));
+        }
         for (name, kind) in [("direct mesh points", "direct"), ("indirect mesh points", "indirect")] {
             let total = count(&format!("/mesh_points/{kind}/total"));
             let evaluated = count(&format!("/mesh_points/{kind}/evaluated"));
@@ -108,11 +128,12 @@ pub fn markdown(entries: &[Entry]) -> String {
     for entry in entries {
         let ListedImage { name, title, caption, .. } = &entry.image;
         // Writing to a string cannot fail.
-        let _ = write!(
-            page,
-            "\n## {title}\n\n![{title}]({name}.png)\n\n{caption}\n\n|  | `{}` |\n|---|---|\n",
-            entry.scene_path
-        );
+        let _ = write!(page, "\n## {title}\n\n![{title}]({name}.png)\n\n");
+        if let Some(Picture { name, .. }) = &entry.beside {
+            let _ = write!(page, "![{title}: {BESIDE}]({name}.png)\n\n");
+        }
+        let below = if entry.beside.is_some() { BELOW } else { "" };
+        let _ = write!(page, "{caption}{below}\n\n|  | `{}` |\n|---|---|\n", entry.scene_path);
         for (name, value) in entry.facts() {
             let _ = writeln!(page, "| {name} | {value} |");
         }
@@ -121,7 +142,7 @@ pub fn markdown(entries: &[Entry]) -> String {
     page
 }
 
-/// The page in HTML with the images inside.
+/// The page in HTML; images lie beside it.
 pub fn html(entries: &[Entry]) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
@@ -132,11 +153,18 @@ pub fn html(entries: &[Entry]) -> String {
     for entry in entries {
         let ListedImage { name, title, caption, .. } = &entry.image;
         let (title, caption) = (inline(title), inline(caption));
-        let data = BASE64.encode(&entry.png);
+        let show = |page: &mut String, picture: &Picture, title: &str| {
+            let _ = writeln!(page, "<img alt=\"{title}\" src=\"{}.png\">", picture.name);
+        };
+        let _ = write!(page, "<section id=\"{name}\">\n<h2>{title}</h2>\n");
+        show(&mut page, &entry.picture, &title);
+        if let Some(beside) = &entry.beside {
+            show(&mut page, beside, &format!("{title}: {BESIDE}"));
+        }
+        let below = if entry.beside.is_some() { BELOW } else { "" };
         let _ = write!(
             page,
-            "<section id=\"{name}\">\n<h2>{title}</h2>\n<img alt=\"{title}\" src=\"data:image/png;base64,{data}\">\n\
-             <p>{caption}</p>\n<table>\n<tr><th>file<td><code>{}</code>\n",
+            "<p>{caption}{below}</p>\n<table>\n<tr><th>file<td><code>{}</code>\n",
             escaped(&entry.scene_path)
         );
         for (name, value) in entry.facts() {
@@ -148,7 +176,7 @@ pub fn html(entries: &[Entry]) -> String {
 }
 
 const STYLE: &str = ":root{color-scheme:light dark}\
-body{font:16px/1.5 system-ui,sans-serif;max-width:44rem;margin:2rem auto;padding:0 1rem}\
+body{font:16px/1.5 system-ui,sans-serif;max-width:80rem;margin:2rem auto;padding:0 1rem}\
 img{display:block;max-width:100%;image-rendering:auto}\
 section{margin-top:3rem}\
 th{text-align:left;font-weight:normal;opacity:.7;padding-right:1rem}\
