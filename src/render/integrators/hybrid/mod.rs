@@ -47,9 +47,11 @@ pub(super) fn shade_hybrid<A: Accel>(
     for patch in &mut patches {
         prior.add(patch, vertices, scratch);
     }
-    let mut visibility = prior.visibility(&patches, vertices.len());
-    let mut counters =
-        LightTracer::new(accel, lights, tile, &mut patches, &prior, &mut visibility).trace(vertices);
+    // What single lights come to matters for edges within pixels alone.
+    let has_edges = !paths.origins.is_empty();
+    let mut visibility = has_edges.then(|| prior.visibility(&patches, vertices.len()));
+    let tracer = LightTracer::new(accel, lights, tile, &mut patches, &prior, visibility.as_mut());
+    let mut counters = tracer.trace(vertices);
     for patch in &patches {
         let points = &mut light[patch.vertices.clone()];
         for (lane, light) in points.iter_mut().enumerate() {
@@ -57,6 +59,8 @@ pub(super) fn shade_hybrid<A: Accel>(
             *light = Vec3::from(patch.light.map(|channel| channel[lane])).max(Vec3::ZERO);
         }
     }
-    counters.shadow_rays += smooth_shadow_edges(accel, lights, tile, paths, &visibility, scale, light);
+    if let Some(visibility) = &visibility {
+        counters.shadow_rays += smooth_shadow_edges(accel, lights, tile, paths, visibility, scale, light);
+    }
     counters
 }

@@ -73,8 +73,8 @@ pub struct LightTracer<'a, A> {
     tile: &'a Tile,
     patches: &'a mut [Patch],
     prior: &'a Prior<'a>,
-    /// What is known of all lights.
-    visibility: &'a mut TileVisibility,
+    /// What is known of all lights, if that is asked for.
+    visibility: Option<&'a mut TileVisibility>,
     views: Vec<View>,
     /// The patches along a Morton curve, so that those that follow each other are neighbours.
     order: Vec<u32>,
@@ -94,7 +94,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
         tile: &'a Tile,
         patches: &'a mut [Patch],
         prior: &'a Prior<'a>,
-        visibility: &'a mut TileVisibility,
+        visibility: Option<&'a mut TileVisibility>,
     ) -> Self {
         let views = vec![View::new(Assumption::Dark); patches.len()];
         let mut order: Vec<u32> = (0..patches.len() as u32).collect();
@@ -199,8 +199,10 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             };
             if changed != 0 {
                 patch.add_to(changed, sign, self.lights, index, light);
-                for lane in (0..patch.vertices.len()).filter(|lane| changed >> lane & 1 == 1) {
-                    self.visibility.seen_mut(patch.vertices.start + lane)[index] ^= 1 << light;
+                if let Some(visibility) = &mut self.visibility {
+                    for lane in (0..patch.vertices.len()).filter(|lane| changed >> lane & 1 == 1) {
+                        visibility.seen_mut(patch.vertices.start + lane)[index] ^= 1 << light;
+                    }
                 }
             }
         }
