@@ -169,6 +169,13 @@ impl<A: Accel> Tracer<'_, A> {
     /// Traces some samples of the camera rays of up to 16 pixels, given by column, row, and index within the tile.
     #[inline(always)]
     fn trace_square(&mut self, camera: &CameraRays, pixels: &[(u32, u32, u32)], samples: Range<u32>) {
+        let pending =
+            |x, y, pixel, sample| Pending { ray: camera.ray(x, y, sample), weight: Vec3::ONE, pixel };
+        if samples.len() == 1 {
+            let rays = pixels.iter().map(|&(x, y, pixel)| pending(x, y, pixel, samples.start));
+            self.trace(rays, 1, Coherence::Coherent);
+            return;
+        }
         if samples.len() % WIDTH == 0 {
             for &(x, y, pixel) in pixels {
                 for first in samples.clone().step_by(WIDTH) {
@@ -177,10 +184,9 @@ impl<A: Accel> Tracer<'_, A> {
             }
             return;
         }
-        let rays = pixels.iter().flat_map(|&(x, y, pixel)| {
-            let ray = move |sample| Pending { ray: camera.ray(x, y, sample), weight: Vec3::ONE, pixel };
-            samples.clone().map(ray)
-        });
+        let rays = pixels
+            .iter()
+            .flat_map(|&(x, y, pixel)| samples.clone().map(move |sample| pending(x, y, pixel, sample)));
         let mut rays = rays.peekable();
         while rays.peek().is_some() {
             self.trace(rays.by_ref().take(WIDTH), 1, Coherence::Coherent);
