@@ -69,6 +69,7 @@ macro_rules! with_accel {
         }
     };
 }
+#[cfg(feature = "cli")]
 pub(crate) use with_accel;
 
 /// A backend, and what the user should know about the choice.

@@ -14,6 +14,8 @@ mod memory;
 mod packet;
 
 pub use accel::Accel;
+// Benchmarks alone tell backends apart.
+#[cfg(feature = "cli")]
 pub(crate) use backend::with_accel;
 pub use backend::{Backend, BackendChoice, BackendError, Chosen};
 pub use brute_force::BruteForceAccel;

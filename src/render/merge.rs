@@ -48,6 +48,8 @@ pub struct SampleMerger {
     groups: Vec<Group>,
     /// Group of each sample.
     group_of: Vec<u32>,
+    /// Groups in the order of their vertices.
+    order: Vec<u32>,
     /// The last group of each pixel.
     last_of: Vec<u32>,
 }
@@ -66,6 +68,8 @@ struct Group {
     /// Squared distance from the middle of the sample that is nearest to it.
     nearest: f32,
     vertex: PathVertex,
+    /// Where the next of its samples' origins goes.
+    next_origin: u32,
     /// The group of the pixel before it.
     before: u32,
     /// Number of groups of the pixel before it.
@@ -77,8 +81,16 @@ impl SampleMerger {
     pub fn new(footprint: PixelFootprint, pixels: usize, samples: u32) -> Self {
         let single = samples == 1;
         let last_of = if single { Vec::new() } else { vec![NONE; pixels] };
-        let (seen, origins, groups, group_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { footprint, single, seen, origins, groups, group_of, last_of }
+        Self {
+            footprint,
+            single,
+            seen: Vec::new(),
+            origins: Vec::new(),
+            groups: Vec::new(),
+            group_of: Vec::new(),
+            order: Vec::new(),
+            last_of,
+        }
     }
 
     /// Whether samples that lie within `way` of their middle, which sees a surface point, may stand together.
@@ -91,8 +103,8 @@ impl SampleMerger {
     #[inline(always)]
     pub fn add(&mut self, seen: Seen, origins: impl IntoIterator<Item = Vec3>, paths: &mut TilePaths) {
         if self.single {
-            let Seen { surface, reflectance, pixel, samples, .. } = seen;
-            paths.vertices.push(PathVertex { surface, reflectance, pixel, first_sample: 0, samples });
+            let Seen { surface, reflectance, pixel, .. } = seen;
+            paths.vertices.push(PathVertex { surface, reflectance, pixel });
         } else {
             self.seen.push(seen);
             self.origins.extend(origins);
@@ -110,22 +122,30 @@ impl SampleMerger {
             return;
         }
         self.group_all();
-        let Self { seen, origins, groups, group_of, .. } = self;
-        let mut first_sample = paths.origins.len() as u32;
-        for group in &mut *groups {
-            group.vertex.first_sample = first_sample;
-            group.positions /= group.count as f32;
-            first_sample += group.count;
+        let Self { seen, origins, groups, group_of, order, .. } = self;
+        let numbers = 0..groups.len() as u32;
+        for rank in 0.. {
+            order.extend(numbers.clone().filter(|&number| groups[number as usize].rank == rank));
+            if order.len() == groups.len() {
+                break;
+            }
         }
-        paths.origins.resize(first_sample as usize, Vec3::ZERO);
+        let mut end = paths.origins.len() as u32;
+        for &number in &*order {
+            let group = &mut groups[number as usize];
+            group.positions /= group.count as f32;
+            group.next_origin = end;
+            end += group.count;
+            paths.origin_ends.push(end);
+        }
+        paths.origins.resize(end as usize, Vec3::ZERO);
         let mut left = &origins[..];
         for (seen, &group) in seen.iter().zip(&*group_of) {
-            let Group { positions: middle, nearest, vertex, .. } = &mut groups[group as usize];
+            let Group { positions: middle, nearest, vertex, next_origin, .. } = &mut groups[group as usize];
             let (own, others) = left.split_at(seen.samples as usize);
             left = others;
-            paths.origins[(vertex.first_sample + vertex.samples) as usize..][..own.len()]
-                .copy_from_slice(own);
-            vertex.samples += seen.samples;
+            paths.origins[*next_origin as usize..][..own.len()].copy_from_slice(own);
+            *next_origin += seen.samples;
             let distance = seen.surface.position.distance_squared(*middle);
             if distance < *nearest {
                 *nearest = distance;
@@ -133,18 +153,18 @@ impl SampleMerger {
             }
             self.last_of[seen.pixel as usize] = NONE;
         }
-        let (mut rank, mut left) = (0, groups.len());
-        while left > 0 {
-            for group in groups.iter_mut().filter(|group| group.rank == rank) {
-                if group.count > 1 {
-                    group.vertex.surface.shading_normal = group.normals.normalize();
-                }
-                paths.vertices.push(group.vertex);
-                left -= 1;
+        for &number in &*order {
+            let group = &mut groups[number as usize];
+            if group.count > 1 {
+                group.vertex.surface.shading_normal = group.normals.normalize();
             }
-            rank += 1;
+            paths.vertices.push(group.vertex);
         }
-        (seen.clear(), origins.clear(), groups.clear(), group_of.clear());
+        seen.clear();
+        origins.clear();
+        groups.clear();
+        group_of.clear();
+        order.clear();
     }
 
     /// Whether samples of a pixel that were added since the last vertices see more than one surface, one of several colours, or the background
@@ -194,7 +214,8 @@ impl SampleMerger {
                 normals: Vec3::ZERO,
                 count: 0,
                 nearest: f32::INFINITY,
-                vertex: PathVertex { surface, reflectance: Vec3::ZERO, pixel, first_sample: 0, samples: 0 },
+                vertex: PathVertex { surface, reflectance: Vec3::ZERO, pixel },
+                next_origin: 0,
                 before: *last,
                 rank,
             });
@@ -238,10 +259,10 @@ mod tests {
             merger.add(seen, [surface.position], &mut paths);
         }
         merger.finish(&mut paths);
-        let found: Vec<_> = paths.vertices.iter().map(|v| (v.pixel, v.samples, v.reflectance.x)).collect();
-        assert_eq!(found, [(0, 3, 1.5), (1, 1, 0.5), (0, 1, 0.5), (0, 1, 0.5), (0, 1, 0.5)]);
+        let found: Vec<_> = paths.vertices.iter().map(|v| (v.pixel, v.reflectance.x)).collect();
+        assert_eq!(found, [(0, 1.5), (1, 0.5), (0, 0.5), (0, 0.5), (0, 0.5)]);
         assert_eq!(paths.vertices[0].surface.position.x, 0.02);
-        let origins: Vec<f32> = paths.origins_of(&paths.vertices[0]).iter().map(|origin| origin.x).collect();
+        let origins: Vec<f32> = paths.origins_of(0).iter().map(|origin| origin.x).collect();
         assert_eq!(origins, [0.0, 0.03, 0.02]);
     }
 }

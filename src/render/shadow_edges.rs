@@ -247,7 +247,8 @@ impl<A: Accel> Edges<'_, A> {
             if share < LEAST_SHARE {
                 continue;
             }
-            let rays = ((share / SHARE_OF_SAMPLE).ceil() as u32).min(self.paths.vertices[vertex].samples);
+            let samples = self.paths.origins_of(vertex).len() as u32;
+            let rays = ((share / SHARE_OF_SAMPLE).ceil() as u32).min(samples);
             // Others for each light.
             let first = number as u32;
             self.asked.push(Asked { vertex: vertex as u32, factor, first, rays, seeing: 0 });
@@ -279,7 +280,7 @@ impl<A: Accel> Edges<'_, A> {
             let middle = outer.surface.position;
             let outwards = middle - vertices[inner as usize].surface.position;
             let along = |origin: &Vec3| (*origin - middle).dot(outwards);
-            let origins = self.paths.origins_of(outer).iter().map(along).enumerate();
+            let origins = self.paths.origins_of(vertex as usize).iter().map(along).enumerate();
             let outermost = origins.max_by(|(_, a), (_, b)| a.total_cmp(b));
             let first = outermost.map_or(0, |(first, _)| first as u32);
             self.asked.push(Asked { vertex, factor: 0.0, first, rays: 1, seeing: 0 });
@@ -312,7 +313,7 @@ impl<A: Accel> Edges<'_, A> {
         let mut filled = 0;
         for at in 0..self.asked.len() {
             let Asked { vertex, first, rays, .. } = self.asked[at];
-            let origins = self.paths.origins_of(&self.paths.vertices[vertex as usize]);
+            let origins = self.paths.origins_of(vertex as usize);
             for ray in 0..rays as usize {
                 let origin = origins[(ray * origins.len() / rays as usize + first as usize) % origins.len()];
                 set_ray(&mut packet, filled, origin, chunk.to_light(number, origin.to_array()));

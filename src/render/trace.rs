@@ -24,10 +24,6 @@ pub struct PathVertex {
     pub reflectance: Vec3,
     /// Pixel within the tile.
     pub pixel: u32,
-    /// Its samples among the origins of the tile, if pixels have several.
-    pub(super) first_sample: u32,
-    /// Samples that see the surface.
-    pub samples: u32,
 }
 
 /// The camera paths of a tile: all surface points that have to be shaded.
@@ -35,8 +31,10 @@ pub struct PathVertex {
 pub struct TilePaths {
     /// Surface points; those of 16 neighbouring rays follow each other.
     pub vertices: Vec<PathVertex>,
-    /// Where shadow rays of the vertices' samples start, if pixels have several samples.
-    pub origins: Vec<Vec3>,
+    /// Where shadow rays of the vertices' samples start, if pixels have several samples: one vertex after the other.
+    pub(super) origins: Vec<Vec3>,
+    /// The end of each vertex's part of them.
+    pub(super) origin_ends: Vec<u32>,
     /// Radiance, summed over the samples of each pixel of the tile: of background and emission once the paths are traced,
     /// of everything once their vertices are shaded.
     pub radiance: Vec<Vec3>,
@@ -53,9 +51,11 @@ impl TilePaths {
     }
 
     /// Where shadow rays of a vertex's samples start; empty if pixels have one sample each.
-    pub fn origins_of(&self, vertex: &PathVertex) -> &[Vec3] {
-        let first = vertex.first_sample as usize;
-        self.origins.get(first..first + vertex.samples as usize).unwrap_or_default()
+    #[inline(always)]
+    pub fn origins_of(&self, vertex: usize) -> &[Vec3] {
+        let end = |vertex: usize| self.origin_ends.get(vertex).map_or(0, |&end| end as usize);
+        let start = vertex.checked_sub(1).map_or(0, end);
+        self.origins.get(start..end(vertex)).unwrap_or_default()
     }
 }
 
@@ -117,6 +117,7 @@ fn trace_tile<A: Accel>(
     paths.vertices.clear();
     paths.vertices.reserve(tile.pixels());
     paths.origins.clear();
+    paths.origin_ends.clear();
     paths.radiance.clear();
     paths.radiance.resize(tile.pixels(), Vec3::ZERO);
     paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
@@ -176,7 +177,7 @@ impl<A: Accel> Tracer<'_, A> {
             self.trace(rays, 1, Coherence::Coherent);
             return;
         }
-        if samples.len() % WIDTH == 0 {
+        if samples.len().is_multiple_of(WIDTH) {
             for &(x, y, pixel) in pixels {
                 for first in samples.clone().step_by(WIDTH) {
                     self.trace_pixel(camera, (x, y, pixel), first);

@@ -50,8 +50,7 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
         if interpolation.hybrid {
-            let (tolerance, scale) = (interpolation.tolerance, interpolation.direct_scale);
-            counters = shade_hybrid(accel, direct, tolerance, scale, tile, paths, &mut scratch, light);
+            counters = shade_hybrid(accel, direct, interpolation, tile, paths, &mut scratch, light);
         } else {
             let mut before = Vec3::NAN;
             for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {

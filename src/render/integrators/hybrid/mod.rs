@@ -16,6 +16,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
+use crate::render::meshes::MeshInterpolation;
 use crate::render::shadow_edges::smooth_shadow_edges;
 use crate::render::stats::ShadeCounters;
 use crate::render::tiles::Tile;
@@ -25,13 +26,12 @@ use patch::Patch;
 use prior::Prior;
 use trace::LightTracer;
 
-/// Shades the vertices of a tile: fills `light` with the I of each, which is to be multiplied by `scale`.
+/// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light.
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
     mesh: DirectView,
-    tolerance: f32,
-    scale: f32,
+    interpolation: &MeshInterpolation,
     tile: &Tile,
     paths: &TilePaths,
     scratch: &mut LookupScratch,
@@ -43,7 +43,7 @@ pub(super) fn shade_hybrid<A: Accel>(
         return ShadeCounters::default();
     }
     let mut patches = Patch::cut(tile, vertices);
-    let mut prior = Prior::new(mesh, tolerance);
+    let mut prior = Prior::new(mesh, interpolation.tolerance);
     for patch in &mut patches {
         prior.add(patch, vertices, scratch);
     }
@@ -60,6 +60,7 @@ pub(super) fn shade_hybrid<A: Accel>(
         }
     }
     if let Some(visibility) = &visibility {
+        let scale = interpolation.direct_scale;
         counters.shadow_rays += smooth_shadow_edges(accel, lights, tile, paths, visibility, scale, light);
     }
     counters
