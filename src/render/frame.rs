@@ -47,11 +47,10 @@ impl StopToken {
     }
 }
 
-/// Samples per block: enough to keep all threads busy and packets full, at 12 bytes each and some 70 per surface point.
+/// Samples per block: enough to keep all threads busy and packets full, at 70 bytes of path each if pixels have one, and 12 each, with some 70 per
+/// surface point, if they have several: then blocks may be larger, at whose ends threads wait for the last tile.
 const BLOCK_SAMPLES: u64 = 1 << 18;
-
-/// Pixels per block at least, where pixels have many samples: at the end of a block threads wait for the last tile.
-const LEAST_BLOCK: u64 = 1 << 16;
+const BLOCK_MERGED_SAMPLES: u64 = 1 << 20;
 
 /// Camera paths are kept until they are shaded up to this many samples per image, from half a gigabyte where pixels have many samples to two where
 /// they have one; beyond, they are traced a second time, and counted twice.
@@ -82,8 +81,8 @@ impl<'a, A: Accel> Frame<'a, A> {
     ) -> Self {
         let camera = CameraRays::new(camera, view.resolution, 1).with_samples(view.samples());
         let samples = u64::from(view.samples_per_pixel);
-        let block_pixels =
-            view.block_samples.map_or((BLOCK_SAMPLES / samples).max(LEAST_BLOCK), |most| most / samples);
+        let most = if samples == 1 { BLOCK_SAMPLES } else { BLOCK_MERGED_SAMPLES };
+        let block_pixels = view.block_samples.unwrap_or(most) / samples;
         let blocks = blocks(view.resolution, block_pixels);
         Self { world, view, camera, blocks, sink, stop, kept: Vec::new() }
     }
