@@ -160,29 +160,30 @@ impl Neighbours {
             let pixel = y * width + x;
             &of_pixels[first[pixel] as usize..first[pixel + 1] as usize]
         };
+        let inwards = |x: usize, y: usize| (x.clamp(1, width.max(3) - 2), y.clamp(1, height.max(3) - 2));
         let mut pairs = Vec::with_capacity(4 * vertices.len());
         let mut at_border = Vec::new();
         for y in 0..height {
             for x in 0..width {
-                let inner = (x.clamp(1, width.max(3) - 2), y.clamp(1, height.max(3) - 2));
                 for (dx, dy) in [(1, 0), (-1, 1), (0, 1), (1, 1)] {
                     let (other_x, other_y) = (x.wrapping_add_signed(dx), y + dy);
                     if other_x >= width || other_y >= height {
                         continue;
                     }
                     let others = of_pixel(other_x, other_y);
-                    let other_inner =
-                        (other_x.clamp(1, width.max(3) - 2), other_y.clamp(1, height.max(3) - 2));
+                    // A pixel inside the border leads to itself, and so to no other.
+                    let leads_in = inwards(x, y) == (other_x, other_y);
+                    let leads_out = inwards(other_x, other_y) == (x, y);
                     for &a in of_pixel(x, y) {
                         for &b in others
                             .iter()
                             .filter(|&&b| is_smooth(&vertices[a as usize], &vertices[b as usize]))
                         {
                             pairs.push((a, b));
-                            if inner != (x, y) && inner == (other_x, other_y) {
+                            if leads_in {
                                 at_border.push((a, b));
                             }
-                            if other_inner != (other_x, other_y) && other_inner == (x, y) {
+                            if leads_out {
                                 at_border.push((b, a));
                             }
                         }
@@ -248,7 +249,8 @@ impl<A: Accel> Edges<'_, A> {
                 continue;
             }
             let samples = self.paths.origins_of(vertex).len() as u32;
-            let rays = ((share / SHARE_OF_SAMPLE).ceil() as u32).min(samples);
+            // At least one, whatever numbers beyond all bounds come to.
+            let rays = ((share / SHARE_OF_SAMPLE).ceil().max(1.0) as u32).min(samples);
             // Others for each light.
             let first = number as u32;
             self.asked.push(Asked { vertex: vertex as u32, factor, first, rays, seeing: 0 });
