@@ -3,8 +3,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::paths::TilePaths;
 use super::tiles::{TILE, Tile};
-use super::trace::TilePaths;
 use crate::image::Image;
 
 /// Receives the tiles of an image as they are finished, each once, in any order and from any thread.

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use super::error::RenderError;
 use super::film::{TileSink, resolve, resolve_block};
+use super::paths::TilePaths;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};
-use super::trace::{TilePaths, trace_paths};
+use super::trace::trace_paths;
 use crate::accel::Accel;
 use crate::image::Image;
 use crate::scene::{Camera, CameraRays};

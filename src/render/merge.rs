@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::trace::{PathVertex, TilePaths};
+use super::paths::{PathVertex, TilePaths};
 use crate::scene::{PixelFootprint, SurfacePoint};
 
 /// Number of no vertex.

@@ -12,6 +12,7 @@ pub mod integrators;
 mod merge;
 mod meshes;
 mod need;
+mod paths;
 mod session;
 mod shadow_edges;
 mod stats;
@@ -26,9 +27,10 @@ pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
+pub use paths::{PathVertex, TilePaths};
 pub use session::{Session, render};
 pub use stats::{
     HybridError, MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds,
 };
 pub use tiles::Tile;
-pub use trace::{PathVertex, TilePaths, trace_paths};
+pub use trace::trace_paths;

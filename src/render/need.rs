@@ -3,8 +3,8 @@
 use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
+use super::paths::TilePaths;
 use super::tiles::TILES_PER_TASK;
-use super::trace::TilePaths;
 use crate::light_mesh::lookup::Lookup;
 use crate::light_mesh::store::PointMask;
 use crate::simd::vectorize;

@@ -6,8 +6,8 @@
 
 use glam::Vec3;
 
+use super::paths::{PathVertex, TilePaths};
 use super::tiles::Tile;
-use super::trace::{PathVertex, TilePaths};
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::lights::{PackedLights, VisibilityBits};
 use crate::simd::LANES;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::trace::PathVertex;
+use super::paths::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::lights::{LightChunk, PackedLights, SeenLights, SurfaceLanes, VisibilityBits};
 use crate::simd::LANES;

@@ -7,9 +7,9 @@ use pulp::NullaryFnOnce;
 
 use super::error::RenderError;
 use super::frame::{BlockIntegrator, Frame};
+use super::paths::TilePaths;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::Tile;
-use super::trace::TilePaths;
 use crate::accel::Accel;
 use crate::light_mesh::surface::{SurfaceMesh, SurfaceView};
 use crate::scene::Camera;

@@ -6,58 +6,13 @@ use glam::Vec3;
 use pulp::NullaryFnOnce;
 
 use super::merge::{SampleMerger, Seen};
+use super::paths::TilePaths;
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
-use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene, SurfacePoint};
+use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene};
 use crate::settings::ViewSettings;
 use crate::simd::vectorize;
 use crate::world::World;
-
-/// A surface that camera paths of a pixel meet, and how much of its illumination reaches the pixel.
-///
-/// A block's vertices are written once and read twice from memory: only what that needs is here.
-#[derive(Clone, Copy, Debug)]
-pub struct PathVertex {
-    /// The point that stands for all that are seen.
-    pub surface: SurfacePoint,
-    /// k_d times the product of the k_s before it, summed over the samples.
-    pub reflectance: Vec3,
-    /// Pixel within the tile.
-    pub pixel: u32,
-}
-
-/// The camera paths of a tile: all surface points that have to be shaded.
-#[derive(Default)]
-pub struct TilePaths {
-    /// Surface points; those of 16 neighbouring rays follow each other.
-    pub vertices: Vec<PathVertex>,
-    /// Where shadow rays of the vertices' samples start, if pixels have several samples: one vertex after the other.
-    pub(super) origins: Vec<Vec3>,
-    /// The end of each vertex's part of them.
-    pub(super) origin_ends: Vec<u32>,
-    /// Radiance, summed over the samples of each pixel of the tile: of background and emission once the paths are traced,
-    /// of everything once their vertices are shaded.
-    pub radiance: Vec<Vec3>,
-    /// Camera rays traced.
-    pub camera_rays: u64,
-    /// Mirror reflections traced.
-    pub reflection_rays: u64,
-}
-
-impl TilePaths {
-    /// The vertices' surface points.
-    pub fn surfaces(&self) -> impl Iterator<Item = &SurfacePoint> {
-        self.vertices.iter().map(|vertex| &vertex.surface)
-    }
-
-    /// Where shadow rays of a vertex's samples start; empty if pixels have one sample each.
-    #[inline(always)]
-    pub fn origins_of(&self, vertex: usize) -> &[Vec3] {
-        let end = |vertex: usize| self.origin_ends.get(vertex).map_or(0, |&end| end as usize);
-        let start = vertex.checked_sub(1).map_or(0, end);
-        self.origins.get(start..end(vertex)).unwrap_or_default()
-    }
-}
 
 /// A camera ray or reflection under way.
 struct Pending {

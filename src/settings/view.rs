@@ -35,7 +35,7 @@ impl PixelFilter {
 
     /// Spreads positions in the unit square as the filter asks for, so that all samples count alike: pixels from the upper left corner of
     /// the one they belong to.
-    pub fn spread(self, width: Option<f32>, positions: Vec<Vec2>) -> Vec<Vec2> {
+    fn spread(self, width: Option<f32>, positions: Vec<Vec2>) -> Vec<Vec2> {
         let width = width.unwrap_or(self.default_width());
         let spread = |along: &dyn Fn(f32) -> f32| {
             positions.iter().map(|position| Vec2::new(along(position.x), along(position.y)) + 0.5).collect()

@@ -6,11 +6,11 @@ use pulp::NullaryFnOnce;
 use crate::accel::Accel;
 use crate::lights::VisibilityBits;
 use crate::render::frame::BlockIntegrator;
+use crate::render::paths::TilePaths;
 use crate::render::shadow_edges::{TileVisibility, smooth_shadow_edges};
 use crate::render::stats::{RenderStats, ShadeCounters};
 use crate::render::surface_group::{SurfaceGroup, light_of_seen};
 use crate::render::tiles::Tile;
-use crate::render::trace::TilePaths;
 use crate::simd::{LANES, vectorize};
 use crate::world::World;
 

@@ -11,9 +11,9 @@ use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
 use crate::render::meshes::MeshInterpolation;
 use crate::render::need::needed_points;
+use crate::render::paths::TilePaths;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
-use crate::render::trace::TilePaths;
 use crate::simd::vectorize;
 use crate::world::World;
 

@@ -17,10 +17,10 @@ use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::meshes::MeshInterpolation;
+use crate::render::paths::TilePaths;
 use crate::render::shadow_edges::smooth_shadow_edges;
 use crate::render::stats::ShadeCounters;
 use crate::render::tiles::Tile;
-use crate::render::trace::TilePaths;
 
 use patch::Patch;
 use prior::Prior;

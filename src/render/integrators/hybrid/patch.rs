@@ -6,9 +6,9 @@ use glam::Vec3;
 
 use crate::accel::LaneMask;
 use crate::lights::PackedLights;
+use crate::render::paths::PathVertex;
 use crate::render::surface_group::SurfaceGroup;
 use crate::render::tiles::Tile;
-use crate::render::trace::PathVertex;
 use crate::simd::{LANES, Lanes};
 
 /// Up to 16 surface points of one square of pixels.

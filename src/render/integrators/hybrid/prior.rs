@@ -4,8 +4,8 @@ use super::patch::Patch;
 use crate::light_mesh::direct::{DirectView, Witnesses};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::lights::VisibilityBits;
+use crate::render::paths::PathVertex;
 use crate::render::shadow_edges::TileVisibility;
-use crate::render::trace::PathVertex;
 use crate::simd::{LANES, Lanes};
 
 /// What is assumed of a light in a patch until a ray says otherwise.

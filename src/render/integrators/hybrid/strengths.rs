@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::lights::{IncidentLights, PackedLights};
-use crate::render::trace::PathVertex;
+use crate::render::paths::PathVertex;
 use crate::simd::{LANES, Lanes};
 
 /// Places of a tile at which the strength of its lights is found.

@@ -6,10 +6,10 @@ use super::prior::{Assumption, Prior};
 use super::strengths::strengths;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::lights::PackedLights;
+use crate::render::paths::PathVertex;
 use crate::render::shadow_edges::TileVisibility;
 use crate::render::stats::{HybridError, ShadeCounters};
 use crate::render::tiles::{TILE, Tile};
-use crate::render::trace::PathVertex;
 use crate::simd::LANES;
 
 /// Rays per patch that check what is assumed, all lights together, for a tolerance of [`TOLERANCE`]; for half of it four
