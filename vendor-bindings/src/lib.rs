@@ -45,6 +45,8 @@ pub mod placement;
 #[cfg(feature = "runtime")]
 mod query;
 #[cfg(feature = "runtime")]
+mod ray;
+#[cfg(feature = "runtime")]
 mod scene;
 
 #[cfg(feature = "runtime")]
@@ -54,6 +56,6 @@ pub use self::{
     filter::Opacity,
     geometry::Geometry,
     library::Library,
-    query::{Hit, Ray},
+    ray::{Hit, Ray},
     scene::{BuildQuality, Scene, SceneBuilder},
 };
