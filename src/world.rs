@@ -1,8 +1,10 @@
 //! A scene together with its acceleration structure and its lights.
 
+use glam::Vec3;
+
 use crate::accel::Accel;
 use crate::lights::{EmissiveTriangles, PackedLights};
-use crate::scene::Scene;
+use crate::scene::{Interaction, Scene};
 
 /// A scene with what was built from it: the acceleration structure and the lights. Everything that traces takes one.
 pub struct World<'a, A> {
@@ -33,5 +35,11 @@ impl<'a, A: Accel> World<'a, A> {
         emissive: &'a EmissiveTriangles,
     ) -> Self {
         Self { accel, scene, lights, emissive }
+    }
+
+    /// Whether light that a surface emits comes along rays that find it: no light stands for it.
+    #[inline(always)]
+    pub fn gathers(&self, seen: &Interaction) -> bool {
+        seen.emission != Vec3::ZERO && !seen.lamp && !self.lights.has_emitters()
     }
 }

@@ -42,6 +42,7 @@ struct Info {
 #[derive(Default, Serialize)]
 struct Lights {
     point: usize,
+    ball: usize,
     spot: usize,
     directional: usize,
 }
@@ -54,6 +55,7 @@ impl Info {
         for light in &scene.lights {
             match light.kind {
                 LightKind::Point => lights.point += 1,
+                LightKind::Ball { .. } => lights.ball += 1,
                 LightKind::Spot { .. } => lights.spot += 1,
                 LightKind::Directional { .. } => lights.directional += 1,
             }
@@ -81,8 +83,8 @@ impl Info {
         writeln!(out, "triangles  {} ({} unique)", self.triangles, self.unique_triangles)?;
         writeln!(out, "meshes     {}, placed {} times", self.meshes, self.instances)?;
         writeln!(out, "materials  {}", self.materials)?;
-        let Lights { point, spot, directional } = self.lights;
-        writeln!(out, "lights     {point} point, {spot} spot, {directional} directional")?;
+        let Lights { point, ball, spot, directional } = self.lights;
+        writeln!(out, "lights     {point} point, {ball} ball, {spot} spot, {directional} directional")?;
         writeln!(out, "cameras    {}", self.cameras.join(", "))?;
         if let Some([min, max]) = self.bounds {
             writeln!(out, "bounds     {min:?} to {max:?}")?;

@@ -162,7 +162,7 @@ fn camera_table(camera: &Camera) -> String {
 fn light_table(light: &Light) -> String {
     let mut table = "[[light]]\n".to_owned();
     let direction = match light.kind {
-        LightKind::Point => None,
+        LightKind::Point | LightKind::Ball { .. } => None,
         LightKind::Spot { direction, .. } | LightKind::Directional { direction } => Some(direction),
     };
     if !matches!(light.kind, LightKind::Directional { .. }) {
@@ -170,6 +170,9 @@ fn light_table(light: &Light) -> String {
     }
     if let Some(direction) = direction {
         table += &format!("direction = {:?}\n", direction.to_array());
+    }
+    if let LightKind::Ball { radius } = light.kind {
+        table += &format!("radius = {radius:?}\n");
     }
     if let LightKind::Spot { inner_cosine, outer_cosine, .. } = light.kind {
         let angles = [inner_cosine, outer_cosine].map(|cosine| cosine.acos().to_degrees());

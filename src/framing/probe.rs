@@ -181,7 +181,7 @@ impl<A: Accel> Probe<'_, A> {
         let strongest = self.scene.lights.iter().map(|light| {
             let (towards, falloff) = match light.kind {
                 LightKind::Directional { direction } => (-direction, 1.0),
-                LightKind::Point | LightKind::Spot { .. } => {
+                LightKind::Point | LightKind::Ball { .. } | LightKind::Spot { .. } => {
                     let offset = light.position - at;
                     (offset.normalize_or_zero(), self.scene.falloff.reciprocal(offset.length()))
                 }
@@ -194,7 +194,7 @@ impl<A: Accel> Probe<'_, A> {
         };
         let ray = match light.kind {
             LightKind::Directional { direction } => Ray::new(at, -direction),
-            LightKind::Point | LightKind::Spot { .. } => Ray::between(at, light.position),
+            LightKind::Point | LightKind::Ball { .. } | LightKind::Spot { .. } => Ray::between(at, light.position),
         };
         irradiance > 0.0 && !self.accel.occluded(&ray)
     }

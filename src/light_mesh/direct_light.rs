@@ -92,7 +92,7 @@ impl DirectLight {
         for (lane, (light, factor)) in self.chosen.iter_mut().enumerate() {
             let origin = surfaces[*light / count].ray_origin();
             let chunk = &lights.chunks()[*light % count / LANES];
-            let way = Vec3::from_array(chunk.to_light(*light % LANES, origin.to_array()));
+            let way = Vec3::from_array(chunk.way(*light % LANES, origin.to_array(), origin, 0));
             *factor *= of_square(lights, way.length_squared(), width);
             packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(origin, way) });
             active |= 1 << lane;

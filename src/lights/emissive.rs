@@ -33,7 +33,7 @@ fn strength(scene: &Scene, instance: u32, triangle: u32) -> f32 {
     let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
     let material = &scene.materials[mesh.materials.of(triangle) as usize];
     // A negative or infinite strength would spoil the choice of all others.
-    let strength = material.emission.max_element();
+    let strength = if material.lamp { 0.0 } else { material.emission.max_element() };
     if strength.is_finite() { strength.max(0.0) } else { 0.0 }
 }
 

@@ -1,13 +1,17 @@
 //! Lights as the inner loops take them: packed sixteen to a chunk, their falloff as a type, and the triangles that emit.
 
 mod emissive;
+mod emitters;
 mod falloff;
 mod kinds;
 mod packed;
+mod shape;
 mod visibility;
 
 pub use emissive::EmissiveTriangles;
+pub(crate) use emitters::emitters;
 pub use packed::PackedLights;
+pub(crate) use shape::lamp_numbers;
 pub(crate) use packed::{IncidentLights, LightChunk, SurfaceLanes};
 pub(crate) use visibility::{SeenLights, VisibilityBits, expand_bits};
 // For tests and benches only.

@@ -3,7 +3,9 @@
 use glam::Vec3;
 
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
+use super::emitters::Emitter;
 use super::kinds::KindLanes;
+use super::shape::{BALL_PARTS, LampShape, lamp_numbers};
 use super::visibility::{Visibility, VisibilityBits};
 use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
@@ -19,18 +21,72 @@ pub struct LightChunk {
     pub intensity: [Lanes; 3],
     /// The lanes that hold a light.
     pub used: VisibilityBits,
+    /// Where rays to the lights end; `None` where all end at the position.
+    shapes: Option<Box<[LampShape; LANES]>>,
 }
 
 impl LightChunk {
+    const EMPTY: Self = Self {
+        position: [[0.0; LANES]; 3],
+        kinds: None,
+        intensity: [[0.0; LANES]; 3],
+        used: 0,
+        shapes: None,
+    };
+
+    fn set(&mut self, lane: usize, light: &Loose, reach: f32) {
+        let (position, intensity, shape) = match light {
+            Loose::Light(light, shape) => {
+                let position = match light.kind {
+                    LightKind::Directional { direction } => direction * -reach.max(1.0),
+                    _ => light.position,
+                };
+                if !matches!(light.kind, LightKind::Point | LightKind::Ball { .. }) {
+                    self.kinds.get_or_insert_with(Default::default).set(lane, light.kind);
+                }
+                let parts = if let LampShape::Ball { .. } = shape { BALL_PARTS } else { 1 };
+                (position, light.intensity / f32::from(parts), shape.clone())
+            }
+            Loose::Emitter(emitter) => {
+                self.kinds.get_or_insert_with(Default::default).set_emitter(lane, emitter);
+                (emitter.position, emitter.intensity, LampShape::Emitter(emitter.pieces.clone()))
+            }
+        };
+        for axis in 0..3 {
+            self.position[axis][lane] = position[axis];
+            self.intensity[axis][lane] = intensity[axis];
+        }
+        self.used |= 1 << lane;
+        if !matches!(shape, LampShape::Point) {
+            self.shapes.get_or_insert_default()[lane] = shape;
+        }
+    }
+
     /// The way from `x` to the light in `lane`: its end is beyond all that could hide the light.
     #[inline(always)]
     pub fn to_light(&self, lane: usize, x: [f32; 3]) -> [f32; 3] {
         let local = self.kinds.as_ref().map_or(1.0, |kinds| kinds.local[lane]);
         [0, 1, 2].map(|axis| self.position[axis][lane] - local * x[axis])
     }
+
+    /// The light in a lane, if it is part of a lamp that has a size.
+    #[inline(always)]
+    pub fn lamp(&self, lane: usize) -> Option<&LampShape> {
+        self.shapes.as_ref().map(|shapes| &shapes[lane]).filter(|shape| !matches!(shape, LampShape::Point))
+    }
+
+    /// The way from `x` to the light in `lane`: of a lamp with a size, to the point that the k-th numbers of a place choose.
+    #[inline(always)]
+    pub fn way(&self, lane: usize, x: [f32; 3], place: Vec3, k: u32) -> [f32; 3] {
+        let to_light = self.to_light(lane, x);
+        match self.lamp(lane) {
+            Some(lamp) => lamp.way(to_light.into(), x.into(), lamp_numbers(place, k)).to_array(),
+            None => to_light,
+        }
+    }
 }
 
-/// All lights of a scene in chunks of 16.
+/// All lights of a scene in chunks of 16. A lamp with a size is several lights.
 ///
 /// The order is that of the scene, except that point lights come first, and lights are sorted along a Morton curve:
 /// lights in one chunk are neighbours, so that they are mostly seen together or hidden together.
@@ -39,11 +95,53 @@ pub struct PackedLights {
     chunks: Vec<LightChunk>,
     falloff: Falloff,
     count: usize,
+    has_emitters: bool,
+}
+
+/// A light before it is packed.
+enum Loose<'a> {
+    /// A light, or a part of a ball.
+    Light(&'a Light, LampShape),
+    Emitter(&'a Emitter),
+}
+
+impl Loose<'_> {
+    fn position(&self) -> Vec3 {
+        match self {
+            Self::Light(light, _) => light.position,
+            Self::Emitter(emitter) => emitter.position,
+        }
+    }
+
+    /// Lights of a kind share chunks.
+    fn class(&self) -> u8 {
+        match self {
+            Self::Light(Light { kind: LightKind::Point, .. }, _) => 0,
+            Self::Light(Light { kind: LightKind::Ball { .. }, .. }, _) => 1,
+            Self::Light(..) => 2,
+            Self::Emitter(_) => 3,
+        }
+    }
+
+    /// The lights that stand for a light.
+    fn of(light: &Light) -> impl Iterator<Item = Loose<'_>> {
+        let (radius, parts) = match light.kind {
+            LightKind::Ball { radius } => (Some(radius), BALL_PARTS),
+            _ => (None, 1),
+        };
+        let shape = move |part| radius.map_or(LampShape::Point, |radius| LampShape::Ball { radius, part });
+        (0..parts).map(move |part| Loose::Light(light, shape(part)))
+    }
 }
 
 impl PackedLights {
     /// Table of a scene's lights.
     pub fn of_scene(scene: &Scene) -> Self {
+        Self::with_emitters(scene, &[])
+    }
+
+    /// The same with emissive triangles of the scene among them.
+    pub fn with_emitters(scene: &Scene, emitters: &[Emitter]) -> Self {
         let directional = |light: &Light| matches!(light.kind, LightKind::Directional { .. });
         let reach = if scene.lights.iter().any(directional) {
             // From wherever mesh points are, a margin around the scene, to beyond its far side.
@@ -51,39 +149,34 @@ impl PackedLights {
         } else {
             0.0
         };
-        Self::new(&scene.lights, scene.falloff, reach)
+        let lights = scene.lights.iter().flat_map(Loose::of).chain(emitters.iter().map(Loose::Emitter));
+        Self::packed(lights.collect(), scene.falloff, reach)
     }
 
     /// Table of lights; occlusion rays to directional lights are `reach` long.
     pub fn new(lights: &[Light], falloff: Falloff, reach: f32) -> Self {
+        Self::packed(lights.iter().flat_map(Loose::of).collect(), falloff, reach)
+    }
+
+    fn packed(lights: Vec<Loose>, falloff: Falloff, reach: f32) -> Self {
         let mut order: Vec<usize> = (0..lights.len()).collect();
         let mut bounds = crate::Bounds::EMPTY;
-        lights.iter().for_each(|light| bounds.extend(light.position));
-        order.sort_by_key(|&i| (lights[i].kind != LightKind::Point, morton(lights[i].position, bounds), i));
-        let chunks = order
-            .chunks(LANES)
-            .map(|members| {
-                let zero = [[0.0; LANES]; 3];
-                let mut chunk = LightChunk { position: zero, kinds: None, intensity: zero, used: 0 };
-                for (lane, light) in members.iter().map(|&i| &lights[i]).enumerate() {
-                    let position = match light.kind {
-                        LightKind::Directional { direction } => direction * -reach.max(1.0),
-                        _ => light.position,
-                    };
-                    if light.kind != LightKind::Point {
-                        let kinds = chunk.kinds.get_or_insert_with(|| Box::new(KindLanes::POINTS));
-                        kinds.set(lane, light.kind);
-                    }
-                    for axis in 0..3 {
-                        chunk.position[axis][lane] = position[axis];
-                        chunk.intensity[axis][lane] = light.intensity[axis];
-                    }
-                    chunk.used |= 1 << lane;
-                }
-                chunk
-            })
-            .collect();
-        Self { chunks, falloff, count: lights.len() }
+        lights.iter().for_each(|light| bounds.extend(light.position()));
+        order.sort_by_key(|&i| (lights[i].class(), morton(lights[i].position(), bounds), i));
+        let chunk = |members: &[usize]| {
+            let mut chunk = LightChunk::EMPTY;
+            members.iter().enumerate().for_each(|(lane, &i)| chunk.set(lane, &lights[i], reach));
+            chunk
+        };
+        let chunks = order.chunks(LANES).map(chunk).collect();
+        let has_emitters = lights.iter().any(|light| matches!(light, Loose::Emitter(_)));
+        Self { chunks, falloff, count: lights.len(), has_emitters }
+    }
+
+    /// Whether light of emissive triangles is among them.
+    #[inline(always)]
+    pub(crate) fn has_emitters(&self) -> bool {
+        self.has_emitters
     }
 
     /// The chunks.

@@ -15,6 +15,10 @@ const WAY: f32 = 16.0;
 /// Difference in brightness, as a share of the brighter, from which on one surface counts for two.
 const CONTRAST: f32 = 0.1;
 
+/// Groups that a pixel has at most: foliage that no two samples see the same of would search them all for each sample, and cast light on each.
+/// A sample beyond them joins the one whose normal is most like its own.
+const CROWD: u32 = 8;
+
 /// What one sample sees, or several that are known to see the same.
 #[derive(Clone, Copy)]
 pub struct Seen {
@@ -156,7 +160,7 @@ impl SampleMerger {
         for &number in &*order {
             let group = &mut groups[number as usize];
             if group.count > 1 {
-                group.vertex.surface.shading_normal = group.normals.normalize();
+                group.vertex.surface.shading_normal = group.normals.normalize_or(group.vertex.surface.shading_normal);
             }
             paths.vertices.push(group.vertex);
         }
@@ -192,9 +196,14 @@ impl SampleMerger {
         let brightness = seen.brightness();
         let last = &mut last_of[pixel as usize];
         let (mut number, mut rank) = (*last, 0);
+        let (mut alike, mut best) = (NONE, f32::NEG_INFINITY);
         while let Some(group) = groups.get(number as usize) {
             let way = surface.position - group.first.position;
-            if group.first.shading_normal.dot(surface.shading_normal) > SAME_WAY
+            let cosine = group.first.shading_normal.dot(surface.shading_normal);
+            if cosine > best {
+                (alike, best) = (number, cosine);
+            }
+            if cosine > SAME_WAY
                 && way.dot(group.first.geometric_normal).abs() < HEIGHT * group.edge
                 && way.length_squared() < (WAY * group.edge) * (WAY * group.edge)
             {
@@ -202,6 +211,9 @@ impl SampleMerger {
             }
             number = group.before;
             rank += 1;
+        }
+        if number == NONE && rank >= CROWD {
+            number = alike;
         }
         if number == NONE {
             number = groups.len() as u32;
@@ -264,5 +276,27 @@ mod tests {
         assert_eq!(paths.vertices[0].surface.position.x, 0.02);
         let origins: Vec<f32> = paths.origins_of(0).iter().map(|origin| origin.x).collect();
         assert_eq!(origins, [0.0, 0.03, 0.02]);
+    }
+
+    /// A pixel of foliage has a bounded number of vertices, and none of its samples is lost.
+    #[test]
+    fn a_pixel_has_no_more_than_a_crowd_of_vertices() {
+        let mut merger = SampleMerger::new(PixelFootprint { eye: Vec3::Y, edge: 0.01 }, 1, 256);
+        let mut paths = TilePaths::default();
+        for leaf in 0..256 {
+            let surface = SurfacePoint::flat(Vec3::splat(leaf as f32), if leaf % 2 == 0 { Vec3::Y } else { -Vec3::Y });
+            let seen = Seen {
+                surface,
+                reflectance: Vec3::splat(0.5),
+                emission: Vec3::ZERO,
+                pixel: 0,
+                samples: 1,
+            };
+            merger.add(seen, [surface.position], &mut paths);
+        }
+        merger.finish(&mut paths);
+        assert_eq!(paths.vertices.len(), CROWD as usize);
+        assert_eq!(paths.vertices.iter().map(|v| v.reflectance.x).sum::<f32>(), 128.0);
+        assert_eq!(paths.origins.len(), 256);
     }
 }

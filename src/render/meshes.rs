@@ -7,6 +7,7 @@ use crate::light_mesh::direct::{DirectInterpolation, DirectMesh};
 use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::light_mesh::points::{AutoSpacing, MeshError};
 use crate::light_mesh::surface::SurfaceMesh;
+use crate::lights::PackedLights;
 use crate::scene::{Camera, Scene};
 use crate::settings::{
     Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
@@ -19,6 +20,8 @@ use crate::settings::{
 /// final values of those that are there, so that views agree with first renders to within the tolerance, not to the bit.
 pub struct LightMeshes {
     pub(super) direct: DirectMesh,
+    /// Whether emissive triangles are among the lights that the direct mesh knows.
+    has_emitters: bool,
     pub(super) indirect: Option<IndirectMesh>,
     /// Points on surfaces, in the form that has them.
     pub(super) surface: Option<SurfaceMesh>,
@@ -79,7 +82,15 @@ impl MeshInterpolation {
 impl LightMeshes {
     /// Meshes over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
-        Self { direct: DirectMesh::new(bounds), indirect: None, surface: None, indirect_identity: None }
+        let direct = DirectMesh::new(bounds);
+        Self { direct, has_emitters: false, indirect: None, surface: None, indirect_identity: None }
+    }
+
+    /// Makes the direct mesh one of these lights: it starts anew where emissive triangles are among them all at once, or no longer.
+    pub(super) fn renew_lights(&mut self, lights: &PackedLights) {
+        if self.has_emitters != lights.has_emitters() {
+            *self = Self { has_emitters: lights.has_emitters(), ..Self::new(self.direct.store().points.bounds()) };
+        }
     }
 
     /// Makes the meshes of indirect light those that the settings ask for: values stay, but for those that other settings would have

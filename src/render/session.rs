@@ -15,7 +15,7 @@ use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectField};
 use crate::light_mesh::store::PointMask;
-use crate::lights::{EmissiveTriangles, PackedLights};
+use crate::lights::{EmissiveTriangles, PackedLights, emitters};
 use crate::scene::{Camera, Scene, SceneError};
 use crate::settings::{Integrator, Settings};
 use crate::world::World;
@@ -27,9 +27,31 @@ use crate::world::World;
 pub struct Session {
     scene: Scene,
     backend: Backend,
-    lights: PackedLights,
+    lights: SceneLights,
     emissive: EmissiveTriangles,
     meshes: LightMeshes,
+}
+
+/// The lights of a scene, as integrators take them.
+struct SceneLights {
+    /// Without emissive triangles, whose light comes with that of all other surfaces: the paper's way.
+    plain: PackedLights,
+    /// With those, if there are any, for Lambertian reflectors, which know what radiance is.
+    with_emitters: Option<PackedLights>,
+}
+
+impl SceneLights {
+    fn of(scene: &Scene) -> Self {
+        let emitters = emitters(scene);
+        let with_emitters = (!emitters.is_empty()).then(|| PackedLights::with_emitters(scene, &emitters));
+        Self { plain: PackedLights::of_scene(scene), with_emitters }
+    }
+
+    /// Those that some settings ask for.
+    fn of_settings(&self, settings: &Settings) -> &PackedLights {
+        let with_emitters = self.with_emitters.as_ref().filter(|_| settings.shading.lambertian);
+        with_emitters.unwrap_or(&self.plain)
+    }
 }
 
 impl Session {
@@ -54,7 +76,7 @@ impl Session {
     }
 
     fn of_valid(scene: Scene, backend: Backend) -> Self {
-        let lights = PackedLights::of_scene(&scene);
+        let lights = SceneLights::of(&scene);
         let emissive = EmissiveTriangles::of_scene(&scene);
         let meshes = LightMeshes::new(scene.bounds());
         Self { scene, backend, lights, emissive, meshes }
@@ -82,7 +104,7 @@ impl Session {
             changed.intensity = before;
             return Err(error);
         }
-        self.lights = PackedLights::of_scene(&self.scene);
+        self.lights = SceneLights::of(&self.scene);
         self.meshes.forget_intensities();
         Ok(true)
     }
@@ -111,6 +133,7 @@ impl Session {
         stop: &StopToken,
     ) -> Result<(Image, RenderStats), RenderError> {
         let Self { scene, backend, lights, emissive, meshes } = self;
+        let lights = lights.of_settings(settings);
         let world = World { accel: &*backend, scene, lights, emissive };
         render_world(world, camera, settings, meshes, sink, stop)
     }
@@ -119,8 +142,8 @@ impl Session {
     /// surface and no normal.
     pub fn direct_light(&self, positions: &[Vec3]) -> Vec<Vec3> {
         let mut field = DirectField::default();
-        field.trace(&self.backend, &self.lights, positions);
-        field.derive(&self.lights, Basis::Light, positions);
+        field.trace(&self.backend, &self.lights.plain, positions);
+        field.derive(&self.lights.plain, Basis::Light, positions);
         (0..positions.len() as u32)
             .map(|slot| {
                 let [r, g, b, ..] = *field.light(slot);
@@ -140,10 +163,11 @@ pub fn render(
     camera: &Camera,
     settings: &Settings,
 ) -> Result<(Image, RenderStats), RenderError> {
-    let lights = PackedLights::of_scene(scene);
+    let lights = SceneLights::of(scene);
     let emissive = EmissiveTriangles::of_scene(scene);
     let mut meshes = LightMeshes::new(scene.bounds());
-    let world = World { accel: backend, scene, lights: &lights, emissive: &emissive };
+    let lights = lights.of_settings(settings);
+    let world = World { accel: backend, scene, lights, emissive: &emissive };
     render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
 }
 
@@ -169,6 +193,7 @@ fn render_frame<A: Accel>(
 ) -> Result<(Image, RenderStats), RenderError> {
     let mut stats = RenderStats::default();
     let world = frame.world;
+    meshes.renew_lights(world.lights);
     let integrator = match settings.shading.integrator {
         Integrator::Auto => {
             let choice = choose(&frame, camera, settings, meshes, &mut stats)?;

@@ -316,9 +316,12 @@ impl<A: Accel> Edges<'_, A> {
         for at in 0..self.asked.len() {
             let Asked { vertex, first, rays, .. } = self.asked[at];
             let origins = self.paths.origins_of(vertex as usize);
-            for ray in 0..rays as usize {
-                let origin = origins[(ray * origins.len() / rays as usize + first as usize) % origins.len()];
-                set_ray(&mut packet, filled, origin, chunk.to_light(number, origin.to_array()));
+            let place = self.paths.vertices[vertex as usize].surface.position;
+            for ray in 0..rays {
+                let sample = ray as usize * origins.len() / rays as usize + first as usize;
+                let origin = origins[sample % origins.len()];
+                // The samples share out a lamp that has a size among them.
+                set_ray(&mut packet, filled, origin, chunk.way(number, origin.to_array(), place, ray + 1));
                 owners[filled] = at;
                 filled += 1;
                 if filled == LANES {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::paths::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{LightChunk, PackedLights, SeenLights, SurfaceLanes, VisibilityBits};
+use crate::lights::{LightChunk, lamp_numbers, PackedLights, SeenLights, SurfaceLanes, VisibilityBits};
 use crate::simd::LANES;
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for
@@ -55,7 +55,16 @@ impl SurfaceGroup {
             packet.dir_z[lane] = d[2];
             facing |= LaneMask::from(cosine > 0.0 && side > 0.0) << lane;
         }
-        facing & self.used
+        let facing = facing & self.used;
+        if let Some(lamp) = chunk.lamp(light) {
+            for lane in (0..LANES).filter(|lane| facing >> lane & 1 == 1) {
+                let x = Vec3::new(packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]);
+                let to_light = Vec3::new(packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]);
+                let way = lamp.way(to_light, x, lamp_numbers(x, 0));
+                [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]] = way.to_array();
+            }
+        }
+        facing
     }
 
     /// Copies the ray of a point, as it was aimed last, into a lane of another packet.

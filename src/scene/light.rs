@@ -19,6 +19,11 @@ pub enum LightKind {
     /// Everywhere alike: the paper's.
     #[default]
     Point,
+    /// The same from a ball around the position: V_i is the part of it that is seen.
+    Ball {
+        /// Its radius, > 0.
+        radius: f32,
+    },
     /// Into a cone: E_i is multiplied by [`LightKind::cone_factor`], V_i and φ1 are a point light's.
     Spot {
         /// Axis of the cone, unit length.
@@ -45,7 +50,7 @@ impl LightKind {
                 let slope = 1.0 / (inner_cosine - outer_cosine).max(1e-3);
                 (slope, -outer_cosine * slope)
             }
-            Self::Point | Self::Directional { .. } => (0.0, 1.0),
+            Self::Point | Self::Ball { .. } | Self::Directional { .. } => (0.0, 1.0),
         }
     }
 
@@ -62,6 +67,12 @@ impl Light {
     /// A light that shines everywhere alike.
     pub fn point(position: Vec3, intensity: Vec3) -> Self {
         Self { position, intensity, kind: LightKind::Point }
+    }
+
+    /// A ball that shines everywhere alike: `intensity` is its radiant intensity I, its radiance I/(π r²). It is seen and casts shadows if a
+    /// mesh in its place is (see [`super::Scene::add_ball`]).
+    pub fn ball(position: Vec3, radius: f32, intensity: Vec3) -> Self {
+        Self { position, intensity, kind: LightKind::Ball { radius } }
     }
 
     /// A light that shines along `direction` (any length but 0): full up to the first of the angles of `cone` from there,

@@ -16,6 +16,8 @@ pub struct Material {
     pub specular: Vec3,
     /// Emiss, linear RGB; leaves the front side only unless `two_sided`.
     pub emission: Vec3,
+    /// Whether a [`Light`](super::Light) stands for what it emits, which then is seen, but lights nothing itself.
+    pub lamp: bool,
     /// Whether front and back are alike.
     pub two_sided: bool,
     /// Whether camera and reflected rays pass through the back of a one-sided surface.
@@ -42,6 +44,7 @@ impl Default for Material {
             diffuse: Vec3::splat(0.8),
             specular: Vec3::ZERO,
             emission: Vec3::ZERO,
+            lamp: false,
             two_sided: false,
             cull: false,
             diffuse_map: None,

@@ -4,6 +4,7 @@ mod alpha_mask;
 mod camera;
 mod camera_rays;
 pub mod generate;
+mod lamps;
 mod light;
 pub mod load;
 mod masked_mesh;

@@ -36,6 +36,8 @@ pub struct Interaction {
     pub specular: Vec3,
     /// Emiss towards the side that was seen.
     pub emission: Vec3,
+    /// Whether a light stands for what it emits.
+    pub lamp: bool,
     /// Whether the front of the triangle (counter-clockwise winding) was seen.
     pub front: bool,
     /// Whether both sides of the material are alike.
@@ -185,6 +187,7 @@ impl Scene {
             diffuse,
             specular: material.specular,
             emission,
+            lamp: material.lamp,
             front,
             two_sided: material.two_sided,
             culled: !front && material.cull && !material.two_sided,

@@ -195,6 +195,9 @@ fn validate_light(light: &Light) -> Result<(), BadValue> {
     if !matches!(light.kind, LightKind::Directional { .. }) {
         check("position", "be finite", light.position, light.position.is_finite())?;
     }
+    if let LightKind::Ball { radius } = light.kind {
+        check("radius", "be finite and above 0", radius, radius.is_finite() && radius > 0.0)?;
+    }
     let (LightKind::Spot { direction, .. } | LightKind::Directional { direction }) = light.kind else {
         return Ok(());
     };

@@ -148,7 +148,7 @@ impl IndirectMesh {
                             }));
                         }
                         let Some((hit, surface)) = hit else { return };
-                        if surface.emission != Vec3::ZERO {
+                        if world.gathers(&surface) {
                             let share = this.mis_weight(emissive.pdf(scene, x, hit, &surface.point));
                             towards_x.push((direction, surface.emission * share));
                         }

@@ -140,9 +140,9 @@ impl IndirectMesh {
     /// number of rays.
     #[inline(always)]
     fn add_emissive<A: Accel>(&self, world: World<A>, x: Vec3, sums: &mut IrradianceSums) -> u64 {
-        let World { accel, scene, emissive, .. } = world;
+        let World { accel, scene, lights, emissive } = world;
         const WIDTH: u32 = 16;
-        let count = self.settings.emitter_samples;
+        let count = if lights.has_emitters() { 0 } else { self.settings.emitter_samples };
         let noise = hash_to_unit_cube(x);
         let mut rays = 0;
         for first in (0..count).step_by(WIDTH as usize) {

@@ -181,7 +181,7 @@ impl<A: Accel> Gather<'_, A> {
                 continue;
             }
             let origin = surface.ray_origin();
-            let way = Vec3::from_array(lights.chunks()[chunk].to_light(index, origin.to_array()));
+            let way = Vec3::from_array(lights.chunks()[chunk].way(index, origin.to_array(), origin, 0));
             // A ray stands for a part of the surface.
             factor *= of_square(lights, way.length_squared(), self.footprint(*distance));
             offered[lane] = reflected * Vec3::from_array(lights.intensity(chunk, index)) * factor;
@@ -208,8 +208,9 @@ impl<A: Accel> Gather<'_, A> {
     /// rays.
     #[inline(always)]
     fn add_emitters(&self, surface: &SurfacePoint, sum: &mut Vec3) -> u64 {
-        let World { accel, scene, emissive, .. } = self.world;
-        let count = if emissive.is_empty() { 0 } else { self.emitter_samples };
+        let World { accel, scene, lights, emissive } = self.world;
+        let all_direct = emissive.is_empty() || lights.has_emitters();
+        let count = if all_direct { 0 } else { self.emitter_samples };
         let x = surface.ray_origin();
         // Other points for other rays.
         let noise = hash_to_unit_cube(x + self.range.start as f32);
@@ -292,7 +293,7 @@ impl<A: Accel> NullaryFnOnce for GatherTask<'_, A> {
                     };
                     let seen = scene.interaction(&hit, turned[lane]);
                     closeness += 1.0 / hit.t;
-                    if seen.emission != Vec3::ZERO {
+                    if gather.world.gathers(&seen) {
                         let ours = count * directions[lane].z / PI;
                         let pdf = emissive.pdf(scene, origin, &hit, &seen.point);
                         let weight = ours / gather.pdf(directions[lane].z, pdf);

@@ -36,6 +36,10 @@ pub fn moved_light(light: &Light, to_world: &Affine3A) -> Light {
     let turned = |direction: Vec3| to_world.transform_vector3(direction).normalize_or(direction);
     let kind = match light.kind {
         LightKind::Point => LightKind::Point,
+        LightKind::Ball { radius } => {
+            let scale = double(&to_world.matrix3).determinant().abs().cbrt() as f32;
+            LightKind::Ball { radius: radius * scale }
+        }
         LightKind::Spot { direction, inner_cosine, outer_cosine } => {
             LightKind::Spot { direction: turned(direction), inner_cosine, outer_cosine }
         }

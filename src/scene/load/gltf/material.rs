@@ -113,6 +113,7 @@ impl<'a> Materials<'a> {
             diffuse,
             specular,
             emission,
+            lamp: false,
             two_sided,
             cull: false,
             diffuse_map,

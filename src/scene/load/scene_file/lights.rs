@@ -5,10 +5,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
-use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point};
+use super::values::{Color, Count, Direction, Finite, Fraction, NonNegative, Point, Positive};
 use crate::sampling::SplitMix64;
 use crate::scene::load::LoadError;
-use crate::scene::{Falloff, Light};
+use crate::scene::{Falloff, Light, Scene};
 use crate::settings::named_enum;
 
 /// Lights that one table may lay out.
@@ -21,6 +21,10 @@ pub struct LightTable {
     position: Option<Point>,
     direction: Option<Direction>,
     cone: Option<[Finite; 2]>,
+    radius: Option<Positive>,
+    size: Option<[Positive; 2]>,
+    up: Option<Direction>,
+    visible: Option<bool>,
     intensity: Color,
 }
 
@@ -36,6 +40,8 @@ pub struct LightBoxTable {
     intensity: Option<Color>,
     total_intensity: Option<Color>,
     color_variation: Option<Fraction>,
+    radius: Option<Positive>,
+    visible: Option<bool>,
 }
 
 /// `[[light_grid]]`
@@ -47,6 +53,8 @@ pub struct LightGridTable {
     counts: [Count<MAX_LIGHTS>; 3],
     intensity: Option<Color>,
     total_intensity: Option<Color>,
+    radius: Option<Positive>,
+    visible: Option<bool>,
 }
 
 named_enum! {
@@ -81,12 +89,29 @@ pub fn falloff(
 }
 
 impl LightTable {
-    /// The light: a position makes a point light, a direction a directional one, both together a spot.
-    pub fn light(table: &Spanned<Self>, index: usize, places: &Places) -> Result<Light, LoadError> {
+    /// Adds the light: a position makes a point light, a direction a directional one, both together a spot; a radius makes a ball of the first and a
+    /// disc of the last, and a size a rectangle.
+    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
         let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
-        let Self { position, direction, cone, intensity } = table.get_ref();
-        if cone.is_some() && (position.is_none() || direction.is_none()) {
+        let Self { position, direction, cone, radius, size, up, visible, intensity } = table.get_ref();
+        let is_placed = position.is_some() && direction.is_some();
+        if cone.is_some() && !is_placed {
             return error("cone needs position and direction");
+        }
+        if size.is_some() && !is_placed {
+            return error("size needs position and direction");
+        }
+        if size.is_some() && radius.is_some() || cone.is_some() && (size.is_some() || radius.is_some()) {
+            return error("radius, size and cone exclude each other");
+        }
+        if radius.is_some() && position.is_none() {
+            return error("radius needs a position");
+        }
+        if up.is_some() && size.is_none() {
+            return error("up belongs to a size");
+        }
+        if visible.is_some() && (radius.is_none() || is_placed) {
+            return error("visible belongs to balls: a radius without a direction");
         }
         let [inner, outer] = cone.map_or([0.0, 45.0], |cone| cone.map(|angle| angle.0));
         let intensity = intensity.0;
@@ -95,12 +120,49 @@ impl LightTable {
                 error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90")
             }
             (None, None) => error("needs a position or a direction"),
-            (Some(position), None) => Ok(Light::point(position, intensity)),
-            (Some(position), Some(direction)) => {
-                Ok(Light::spot(position, direction, [inner, outer], intensity))
+            (Some(position), None) => {
+                add_point(scene, position, radius.as_ref(), visible.unwrap_or(true), intensity);
+                Ok(())
             }
-            (None, Some(direction)) => Ok(Light::directional(direction, intensity)),
+            (Some(position), Some(direction)) => {
+                match (radius, size) {
+                    (Some(radius), _) => scene.add_disc(position, direction, radius.0, intensity),
+                    (_, Some([width, height])) => {
+                        let up = up.as_ref().map_or(Vec3::Y, |up| up.0);
+                        let (u, v) = edges(direction.normalize_or(Vec3::NEG_Y), up);
+                        scene.add_rectangle(position, u * width.0, v * height.0, intensity);
+                    }
+                    _ => scene.lights.push(Light::spot(position, direction, [inner, outer], intensity)),
+                }
+                Ok(())
+            }
+            (None, Some(direction)) => {
+                scene.lights.push(Light::directional(direction, intensity));
+                Ok(())
+            }
         }
+    }
+}
+
+/// Unit vectors along width and height of a rectangle that shines along `direction`, of unit length; its height is as much along `up` as can
+/// be.
+fn edges(direction: Vec3, up: Vec3) -> (Vec3, Vec3) {
+    match up.cross(direction).try_normalize() {
+        Some(width) => (width, direction.cross(width)),
+        None => direction.any_orthonormal_pair(),
+    }
+}
+
+/// Adds a point light, or a ball if it has a radius.
+fn add_point(scene: &mut Scene, position: Vec3, radius: Option<&Positive>, visible: bool, intensity: Vec3) {
+    match radius {
+        Some(radius) => {
+            scene.lights.push(Light::ball(position, radius.0, intensity));
+            if visible {
+                scene.add_ball(position, radius.0, intensity);
+            }
+        }
+        None => scene.lights.push(Light::point(position, intensity)),
     }
 }
 
@@ -118,6 +180,14 @@ fn each(
     }
 }
 
+fn check_visible(
+    radius: Option<&Positive>,
+    visible: Option<bool>,
+    error: impl Fn(&str) -> LoadError,
+) -> Result<(), LoadError> {
+    if visible.is_some() && radius.is_none() { Err(error("visible needs a radius")) } else { Ok(()) }
+}
+
 fn check_box(min: Vec3, max: Vec3, error: impl Fn(&str) -> LoadError) -> Result<(), LoadError> {
     if !(max - min).is_finite() {
         return Err(error("the box from min to max is too large"));
@@ -126,13 +196,9 @@ fn check_box(min: Vec3, max: Vec3, error: impl Fn(&str) -> LoadError) -> Result<
 }
 
 impl LightBoxTable {
-    /// Lights at random positions: per light, x, y and z are drawn, then three factors of the colour
+    /// Adds lights at random positions: per light, x, y and z are drawn, then three factors of the colour
     /// if that varies.
-    pub fn lights(
-        table: &Spanned<Self>,
-        index: usize,
-        places: &Places,
-    ) -> Result<impl Iterator<Item = Light> + use<>, LoadError> {
+    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_box[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
@@ -140,22 +206,20 @@ impl LightBoxTable {
         let each = each(table.intensity, table.total_intensity, table.count.0, error)?;
         let variation = table.color_variation.map(|fraction| fraction.0).filter(|&fraction| fraction > 0.0);
         let mut random = SplitMix64::new(u64::from(table.seed));
-        Ok((0..table.count.0).map(move |_| {
+        check_visible(table.radius.as_ref(), table.visible, error)?;
+        for _ in 0..table.count.0 {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
-            Light::point(position, each * tint)
-        }))
+            add_point(scene, position, table.radius.as_ref(), table.visible.unwrap_or(true), each * tint);
+        }
+        Ok(())
     }
 }
 
 impl LightGridTable {
-    /// Lights at the centres of the cells that the box is divided into; x runs fastest, z slowest.
-    pub fn lights(
-        table: &Spanned<Self>,
-        index: usize,
-        places: &Places,
-    ) -> Result<impl Iterator<Item = Light> + use<>, LoadError> {
+    /// Adds lights at the centres of the cells that the box is divided into; x runs fastest, z slowest.
+    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_grid[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
@@ -167,10 +231,12 @@ impl LightGridTable {
         };
         let each = each(table.intensity, table.total_intensity, count, error)?;
         let cells = Vec3::new(nx as f32, ny as f32, nz as f32);
-        Ok((0..count).map(move |i| {
+        check_visible(table.radius.as_ref(), table.visible, error)?;
+        for i in 0..count {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
-            Light::point(position, each)
-        }))
+            add_point(scene, position, table.radius.as_ref(), table.visible.unwrap_or(true), each);
+        }
+        Ok(())
     }
 }

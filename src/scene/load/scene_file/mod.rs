@@ -114,13 +114,13 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
     })?;
     gathered.scene.background = table.background.map_or(glam::Vec3::ZERO, |color| color.0);
     for (index, light) in table.light.iter().enumerate() {
-        gathered.scene.lights.push(LightTable::light(light, index, &places)?);
+        LightTable::add(light, index, &places, &mut gathered.scene)?;
     }
     for (index, light_box) in table.light_box.iter().enumerate() {
-        gathered.scene.lights.extend(LightBoxTable::lights(light_box, index, &places)?);
+        LightBoxTable::add(light_box, index, &places, &mut gathered.scene)?;
     }
     for (index, grid) in table.light_grid.iter().enumerate() {
-        gathered.scene.lights.extend(LightGridTable::lights(grid, index, &places)?);
+        LightGridTable::add(grid, index, &places, &mut gathered.scene)?;
     }
 
     geometry::load(&table.geometry, &table.material, folder, &places, &mut gathered)?;
