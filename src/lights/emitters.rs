@@ -2,6 +2,7 @@
 //! (method §4).
 
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -11,8 +12,8 @@ use rayon::prelude::*;
 use crate::Bounds;
 use crate::scene::{Hit, Scene};
 
-/// Clusters that a scene may have.
-const MOST_EMITTERS: usize = 256;
+/// Clusters that a scene has at least, if it has so many pieces, and at most.
+const EMITTERS: std::ops::Range<usize> = 16..256;
 /// Pieces that its triangles may be cut into beyond their own number.
 const MOST_CUTS: usize = 4096;
 /// Power times size of a cluster that is not divided further, over the power of all and the diagonal of the scene.
@@ -47,7 +48,7 @@ pub struct Emitter {
     pub axis: Vec3,
     /// I, radiance times area, linear RGB.
     pub intensity: Vec3,
-    /// Area over π, the square of the radius of a disc of its size: on the axis at distance d a disc gives I/(d² + r²).
+    /// Area over π, the square of the radius of a disc of its size.
     pub radius_squared: f32,
     /// What it is made of.
     pub pieces: Arc<[Piece]>,
@@ -123,7 +124,10 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
     if pieces.is_empty() || !(fine > 0.0 && fine.is_finite()) {
         return Vec::new();
     }
-    cut(&mut pieces, scene, 0.5 * fine);
+    cut(&mut pieces, scene, |piece| {
+        let power = piece.power();
+        power * piece.longest().1.sqrt() > 0.5 * fine || power * 4.0 * EMITTERS.start as f32 > total
+    });
     // By the main direction in which they shine: the pieces of a cluster have to face one way.
     let side = |piece: &Loose| {
         let axis = piece.normal.abs().max_position();
@@ -133,10 +137,12 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
     pieces.into_iter().for_each(|piece| sides[side(&piece)].push(piece));
     let mut clusters: BinaryHeap<Cluster> = sides.into_iter().enumerate().filter_map(Cluster::of).collect();
     let mut next = clusters.len();
-    while clusters.len() < MOST_EMITTERS && clusters.peek().is_some_and(|c| c.coarseness > fine && c.pieces.len() > 1)
-    {
-        let Some(largest) = clusters.pop() else { break };
-        for half in largest.halves() {
+    while clusters.len() < EMITTERS.end {
+        let limit = if clusters.len() < EMITTERS.start { 0.0 } else { fine };
+        let Some(largest) = clusters.peek_mut().filter(|c| c.coarseness > limit && c.pieces.len() > 1) else {
+            break;
+        };
+        for half in PeekMut::pop(largest).halves() {
             clusters.extend(Cluster::of((next, half)));
             next += 1;
         }
@@ -185,13 +191,13 @@ fn pieces(scene: &Scene) -> Vec<Loose> {
     (0..scene.instances.len() as u32).into_par_iter().flat_map(of_instance).collect()
 }
 
-/// Cuts pieces in halves whose power times size is above a limit, as long as there are few.
-fn cut(pieces: &mut Vec<Loose>, scene: &Scene, limit: f32) {
+/// Cuts pieces in halves that are too large, as long as there are few.
+fn cut(pieces: &mut Vec<Loose>, scene: &Scene, is_large: impl Fn(&Loose) -> bool) {
     let most = pieces.len() + MOST_CUTS;
     let mut first = 0;
     while first < pieces.len() && pieces.len() < most {
         let piece = &pieces[first];
-        if piece.power() * piece.longest().1.sqrt() > limit {
+        if is_large(piece) {
             let [mut left, mut right] = piece.halves();
             left.look(scene);
             right.look(scene);

@@ -1,7 +1,7 @@
 //! What spot and directional lights differ in from point lights, sixteen at a time.
 
 use super::emitters::Emitter;
-use super::falloff::FalloffLaw;
+use super::falloff::{FalloffLaw, InverseSquareFalloff};
 use crate::scene::LightKind;
 use crate::simd::{LANES, Lanes};
 
@@ -16,9 +16,7 @@ pub(super) struct KindLanes {
     /// Terms of [`LightKind::cone_terms`].
     slope: Lanes,
     offset: Lanes,
-    /// 1 where the clamped share counts as it is, as of emitters; 0 where its square does.
-    linear: Lanes,
-    /// [`Emitter::radius_squared`] of emitters, whose light falls off by law; below 0 for all others.
+    /// [`Emitter::radius_squared`] of emitters, below 0 for all others.
     radius_squared: Lanes,
 }
 
@@ -30,7 +28,6 @@ impl Default for KindLanes {
             axis: [[0.0; LANES]; 3],
             slope: [0.0; LANES],
             offset: [1.0; LANES],
-            linear: [0.0; LANES],
             radius_squared: [-1.0; LANES],
         }
     }
@@ -48,10 +45,10 @@ impl KindLanes {
         }
     }
 
-    /// Makes a lane that of an emitter: a share of cos, and I/(d² + r²).
+    /// Makes a lane that of an emitter.
     pub fn set_emitter(&mut self, lane: usize, emitter: &Emitter) {
         (0..3).for_each(|axis| self.axis[axis][lane] = emitter.axis[axis]);
-        (self.slope[lane], self.offset[lane], self.linear[lane]) = (1.0, 0.0, 1.0);
+        (self.slope[lane], self.offset[lane]) = (1.0, 0.0);
         self.radius_squared[lane] = emitter.radius_squared;
     }
 
@@ -61,19 +58,27 @@ impl KindLanes {
         let [x, y, z] = to_light;
         let along = self.axis[0][lane] * x + self.axis[1][lane] * y + self.axis[2][lane] * z;
         let share = (self.offset[lane] - self.slope[lane] * along / distance).clamp(0.0, 1.0);
-        share * if self.linear[lane] == 1.0 { 1.0 } else { share }
+        let size = self.radius_squared[lane] / (distance * distance);
+        if size >= 0.0 { share * disc(share, size) } else { share * share }
     }
 
-    /// φ1 of directional lights is 1: 1/(t·φ1(t)) is 1/t. That of emitters is t² + r².
+    /// φ1 of directional lights is 1: 1/(t·φ1(t)) is 1/t. That of emitters is t².
     #[inline(always)]
     pub fn over_distance(&self, lane: usize, falloff: impl FalloffLaw, distance: f32) -> f32 {
-        let radius_squared = self.radius_squared[lane];
-        if radius_squared >= 0.0 {
-            1.0 / (distance * (distance * distance + radius_squared))
+        if self.radius_squared[lane] >= 0.0 {
+            InverseSquareFalloff.over_distance(distance)
         } else if self.local[lane] == 0.0 {
             1.0 / distance
         } else {
             falloff.over_distance(distance)
         }
     }
+}
+
+/// What a disc gives to a surface parallel to it, over what a point in its middle does, given the cosine c at its axis and the square q of its radius over
+/// the distance: exactly 1/(1 + q) on the axis, and to first order in q everywhere, 1 + q·(3 sin² − 1).
+#[inline(always)]
+fn disc(cosine: f32, size: f32) -> f32 {
+    let shrunk = 1.0 / (1.0 + size);
+    shrunk * (1.0 + 3.0 * (1.0 - cosine * cosine) * size * shrunk)
 }

@@ -5,8 +5,9 @@ use glam::Vec3;
 use super::falloff::{FalloffLaw, InverseSquareFalloff, LinearFalloff, NoFalloff, with_falloff};
 use super::emitters::Emitter;
 use super::kinds::KindLanes;
-use super::shape::{BALL_PARTS, LampShape, lamp_numbers};
+use super::shape::{LampShape, ball_parts, lamp_numbers};
 use super::visibility::{Visibility, VisibilityBits};
+use crate::accel::Coherence;
 use crate::scene::{Falloff, Light, LightKind, Scene, SurfacePoint};
 use crate::simd::{LANES, Lanes, horizontal_sums};
 
@@ -44,7 +45,7 @@ impl LightChunk {
                 if !matches!(light.kind, LightKind::Point | LightKind::Ball { .. }) {
                     self.kinds.get_or_insert_with(Default::default).set(lane, light.kind);
                 }
-                let parts = if let LampShape::Ball { .. } = shape { BALL_PARTS } else { 1 };
+                let parts = if let LampShape::Ball { part: (_, parts), .. } = shape { *parts } else { 1 };
                 (position, light.intensity / f32::from(parts), shape.clone())
             }
             Loose::Emitter(emitter) => {
@@ -73,6 +74,13 @@ impl LightChunk {
     #[inline(always)]
     pub fn lamp(&self, lane: usize) -> Option<&LampShape> {
         self.shapes.as_ref().map(|shapes| &shapes[lane]).filter(|shape| !matches!(shape, LampShape::Point))
+    }
+
+    /// Whether rays of neighbours towards a light stay together: those to a lamp with a size go to different points of it, and take a tenth longer as
+    /// one packet.
+    #[inline(always)]
+    pub fn coherence(&self, lane: usize) -> Coherence {
+        if self.lamp(lane).is_some() { Coherence::Incoherent } else { Coherence::Coherent }
     }
 
     /// The way from `x` to the light in `lane`: of a lamp with a size, to the point that the k-th numbers of a place choose.
@@ -123,14 +131,20 @@ impl Loose<'_> {
         }
     }
 
-    /// The lights that stand for a light.
-    fn of(light: &Light) -> impl Iterator<Item = Loose<'_>> {
-        let (radius, parts) = match light.kind {
-            LightKind::Ball { radius } => (Some(radius), BALL_PARTS),
-            _ => (None, 1),
-        };
-        let shape = move |part| radius.map_or(LampShape::Point, |radius| LampShape::Ball { radius, part });
-        (0..parts).map(move |part| Loose::Light(light, shape(part)))
+    /// The lights that stand for some lights.
+    fn of(lights: &[Light]) -> impl Iterator<Item = Loose<'_>> {
+        let balls = lights.iter().filter(|light| matches!(light.kind, LightKind::Ball { .. })).count();
+        lights.iter().flat_map(move |light| {
+            let (radius, parts) = match light.kind {
+                LightKind::Ball { radius } => (Some(radius), ball_parts(balls)),
+                _ => (None, 1),
+            };
+            (0..parts).map(move |number| {
+                let part = (number, parts);
+                let shape = radius.map_or(LampShape::Point, |radius| LampShape::Ball { radius, part });
+                Loose::Light(light, shape)
+            })
+        })
     }
 }
 
@@ -149,13 +163,13 @@ impl PackedLights {
         } else {
             0.0
         };
-        let lights = scene.lights.iter().flat_map(Loose::of).chain(emitters.iter().map(Loose::Emitter));
+        let lights = Loose::of(&scene.lights).chain(emitters.iter().map(Loose::Emitter));
         Self::packed(lights.collect(), scene.falloff, reach)
     }
 
     /// Table of lights; occlusion rays to directional lights are `reach` long.
     pub fn new(lights: &[Light], falloff: Falloff, reach: f32) -> Self {
-        Self::packed(lights.iter().flat_map(Loose::of).collect(), falloff, reach)
+        Self::packed(Loose::of(lights).collect(), falloff, reach)
     }
 
     fn packed(lights: Vec<Loose>, falloff: Falloff, reach: f32) -> Self {

@@ -1,6 +1,6 @@
 //! Lights with a size: where on them occlusion rays end (method §4).
 
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::TAU;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -8,8 +8,11 @@ use glam::{Vec2, Vec3};
 use super::emitters::Piece;
 use crate::sampling::hash_to_unit_cube;
 
-/// Parts of a ball, each of which is a light of its own: a quarter of the disc that one sees of it.
-pub(super) const BALL_PARTS: u8 = 4;
+/// Parts that a ball is divided into, sectors of the disc that one sees of it, each of which is a light of its own. The first rays to a lamp, one for each part,
+/// have to find that it is hidden in part; of many lamps each matters less.
+pub(super) fn ball_parts(balls: usize) -> u8 {
+    (64 / balls.max(1)).clamp(1, 4) as u8
+}
 
 /// A ray that starts so far from a surface, as a part of its own length, doesn't touch it.
 const SHORTER: f32 = 1.0 - 1e-4;
@@ -20,12 +23,12 @@ pub enum LampShape {
     /// No size: rays end at the light's position.
     #[default]
     Point,
-    /// One of [`BALL_PARTS`] sectors of the disc that is seen of a ball.
+    /// One sector of the disc that is seen of a ball.
     Ball {
         /// Radius of the ball.
         radius: f32,
-        /// Number of the sector.
-        part: u8,
+        /// Number of the sector, and of all of them.
+        part: (u8, u8),
     },
     /// Pieces of triangles, in the order of their shares.
     Emitter(Arc<[Piece]>),
@@ -44,7 +47,7 @@ impl LampShape {
                 }
                 let direction = to_light / distance;
                 let (u, v) = direction.any_orthonormal_pair();
-                let angle = FRAC_PI_2 * (f32::from(*part) + numbers.y);
+                let angle = TAU * (f32::from(part.0) + numbers.y) / f32::from(part.1);
                 let from_axis = radius * numbers.x.sqrt();
                 // From nearby less than a half of the ball is seen: rays that touch it do so closer to the eye than its middle.
                 let towards = (radius * radius / distance).max((radius * radius - from_axis * from_axis).sqrt());
@@ -84,8 +87,8 @@ mod tests {
         let to_light = centre - x;
         let mut inner = 0;
         for k in 0..1000 {
-            for part in 0..BALL_PARTS {
-                let way = LampShape::Ball { radius, part }.way(to_light, x, lamp_numbers(x, k));
+            for part in 0..4 {
+                let way = LampShape::Ball { radius, part: (part, 4) }.way(to_light, x, lamp_numbers(x, k));
                 let from_centre = way / SHORTER - to_light;
                 assert!((from_centre.length() / radius - 1.0).abs() < 1e-2);
                 assert!(from_centre.dot(to_light) < 0.0);
@@ -99,7 +102,7 @@ mod tests {
     /// Nothing beyond what can be seen of a ball nearby is looked for, and nothing from inside.
     #[test]
     fn rays_to_a_near_ball_end_before_it() {
-        let ball = LampShape::Ball { radius: 1.0, part: 1 };
+        let ball = LampShape::Ball { radius: 1.0, part: (1, 2) };
         for k in 0..100 {
             let way = ball.way(Vec3::Z * 1.2, Vec3::ZERO, lamp_numbers(Vec3::ZERO, k));
             // Along the way, no point before its end is inside.

@@ -313,6 +313,7 @@ impl<A: Accel> Edges<'_, A> {
         let mut packet = RayPacket::<LANES>::empty();
         let mut owners = [0usize; LANES];
         let mut filled = 0;
+        let coherence = chunk.coherence(number);
         for at in 0..self.asked.len() {
             let Asked { vertex, first, rays, .. } = self.asked[at];
             let origins = self.paths.origins_of(vertex as usize);
@@ -325,22 +326,22 @@ impl<A: Accel> Edges<'_, A> {
                 owners[filled] = at;
                 filled += 1;
                 if filled == LANES {
-                    self.send(&mut packet, &owners);
+                    self.send(&mut packet, &owners, coherence);
                     filled = 0;
                 }
             }
         }
-        self.send(&mut packet, &owners[..filled]);
+        self.send(&mut packet, &owners[..filled], coherence);
     }
 
     /// Traces the rays of a packet, which belong to the `owners`.
     #[inline(always)]
-    fn send(&mut self, packet: &mut RayPacket<LANES>, owners: &[usize]) {
+    fn send(&mut self, packet: &mut RayPacket<LANES>, owners: &[usize], coherence: Coherence) {
         if owners.is_empty() {
             return;
         }
         let active = ((1u32 << owners.len()) - 1) as LaneMask;
-        let blocked = self.accel.occluded_packet(active, packet, Coherence::Coherent);
+        let blocked = self.accel.occluded_packet(active, packet, coherence);
         self.rays += owners.len() as u64;
         for (lane, &owner) in owners.iter().enumerate() {
             self.asked[owner].seeing += u32::from(!blocked >> lane & 1 == 1);

@@ -14,6 +14,8 @@ pub(super) struct SurfaceGroup {
     /// The points themselves; rays start a little in front of them.
     pub points: SurfaceLanes,
     used: LaneMask,
+    /// Of the rays as they were aimed last.
+    coherence: Coherence,
 }
 
 impl SurfaceGroup {
@@ -38,7 +40,7 @@ impl SurfaceGroup {
             }
             used |= 1 << lane;
         }
-        Self { packet, points, used }
+        Self { packet, points, used, coherence: Coherence::Coherent }
     }
 
     /// Aims the rays at a light; returns the points that have it above their horizon.
@@ -56,6 +58,7 @@ impl SurfaceGroup {
             facing |= LaneMask::from(cosine > 0.0 && side > 0.0) << lane;
         }
         let facing = facing & self.used;
+        self.coherence = chunk.coherence(light);
         if let Some(lamp) = chunk.lamp(light) {
             for lane in (0..LANES).filter(|lane| facing >> lane & 1 == 1) {
                 let x = Vec3::new(packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]);
@@ -83,7 +86,7 @@ impl SurfaceGroup {
     #[inline(always)]
     pub fn seeing<A: Accel>(&mut self, accel: &A, points: LaneMask) -> LaneMask {
         self.packet.tfar = [1.0; LANES];
-        points & !accel.occluded_packet(points, &mut self.packet, Coherence::Coherent)
+        points & !accel.occluded_packet(points, &mut self.packet, self.coherence)
     }
 }
 

@@ -10,6 +10,7 @@ mod determinism;
 mod estimators;
 mod furnace;
 mod hybrid;
+mod lamps;
 mod lazy;
 mod leaks;
 mod moving;

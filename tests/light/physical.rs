@@ -46,9 +46,12 @@ fn scene_text(folder: &Path, name: &str) -> String {
         description["resolution"],
         description["geometry"],
     );
-    for light in description["point_lights"].as_array().unwrap() {
+    for light in ["point_lights", "lamps"].iter().filter_map(|key| description[key].as_array()).flatten() {
         let (position, intensity) = (&light["position"], &light["intensity_w_per_sr"]);
         let _ = write!(scene, "[[light]]\nposition = {position}\nintensity = {intensity}\n");
+        if let Some(radius) = light["radius"].as_f64().filter(|&radius| radius > 0.0) {
+            let _ = write!(scene, "radius = {radius}\n");
+        }
     }
     scene
 }
@@ -112,6 +115,17 @@ fn direct_light_of_the_cornell_box_is_the_path_tracers() {
     pair.assert_alike("cornell-direct");
 }
 
+/// Four balls, a point and an emissive panel, alone and with all bounces.
+#[test]
+fn lamps_with_a_size_light_a_yard_as_the_path_tracers_do() {
+    let no_indirect = |settings: &mut Settings| settings.mesh.indirect = None;
+    let Some(pair) = pair("yard", "yard-direct", no_indirect) else { return };
+    pair.assert_alike("yard-direct");
+    if let Some(pair) = self::pair("yard", "yard-all-bounces", |_| ()) {
+        pair.assert_alike("yard-all-bounces");
+    }
+}
+
 #[test]
 fn one_bounce_in_the_cornell_box_is_the_path_tracers() {
     let Some(pair) = pair("cornell", "cornell-one-bounce", one_bounce) else { return };
@@ -124,7 +138,7 @@ fn all_bounces_in_the_cornell_box_are_the_path_tracers() {
     pair.assert_alike("cornell-all-bounces");
 }
 
-/// All light comes from a shining square, and so through the indirect mesh. Pixels that see the lamp, and those around
+/// All light comes from a shining square. Pixels that see the lamp, and those around
 /// them, through which its edge goes, are left out: they show how pixels are filtered, not how light travels.
 #[test]
 fn a_lamp_lights_the_cornell_box_as_the_path_tracers() {

@@ -185,7 +185,8 @@ impl<'a, A: Accel> LightTracer<'a, A> {
             }
         }
         let mut crowded = None;
-        while self.trace_wanted() {
+        let coherence = self.lights.chunks()[index].coherence(light);
+        while self.trace_wanted(coherence) {
             let first = crowded.is_none();
             let crowded = *crowded.get_or_insert_with(|| self.crowded());
             self.judge(index, light, if first { crowded } else { 0 });
@@ -210,7 +211,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
 
     /// Traces the wanted rays; returns whether there were any.
     #[inline(always)]
-    fn trace_wanted(&mut self) -> bool {
+    fn trace_wanted(&mut self, coherence: Coherence) -> bool {
         self.batch.clear();
         for &number in &self.order {
             let view = &mut self.views[number as usize];
@@ -228,7 +229,7 @@ impl<'a, A: Accel> LightTracer<'a, A> {
                 self.patches[number as usize].group.copy_ray(lane as usize, &mut packet, to);
             }
             let active = ((1u64 << batch.len()) - 1) as LaneMask;
-            let blocked = self.accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+            let blocked = self.accel.occluded_packet(active, &mut packet, coherence);
             for (from, &(number, lane)) in batch.iter().enumerate() {
                 self.views[number as usize].seeing |= (!blocked >> from & 1) << lane;
             }
