@@ -67,6 +67,8 @@ const SMOOTH_COSINE: f32 = 0.9;
 const SMOOTH_HEIGHT: f32 = 0.2;
 /// Share of a pixel's light that each of the samples decides about.
 const SHARE_OF_SAMPLE: f32 = 1.0 / 48.0;
+/// Below so many rays of a vertex towards a light the first one, which found the edge, counts too.
+const FEW: u32 = 4;
 /// Share of a pixel's light below which a light's edge stays as it is.
 const LEAST_SHARE: f32 = 1.0 / 96.0;
 
@@ -259,7 +261,9 @@ impl<A: Accel> Edges<'_, A> {
         for asked in &self.asked {
             let vertex = asked.vertex as usize;
             let before = if self.visibility.sees(vertex, of) { 1.0 } else { 0.0 };
-            let part = asked.seeing as f32 / asked.rays as f32;
+            // What is known already is a sample more, which counts where there are few.
+            let known = if asked.rays < FEW { 1.0 } else { 0.0 };
+            let part = (asked.seeing as f32 + known * before) / (asked.rays as f32 + known);
             light[vertex] = (light[vertex] + intensity * (asked.factor * (part - before))).max(Vec3::ZERO);
         }
     }

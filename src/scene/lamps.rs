@@ -8,7 +8,7 @@ use super::material::Material;
 use super::mesh::TriangleMesh;
 use super::scene::Scene;
 
-/// Sides of a disc and of a ball's equator: the area of so many is that of the circle to 1 %.
+/// Sides of a disc and of a ball's equator.
 const SIDES: u32 = 24;
 
 impl Scene {
@@ -16,6 +16,9 @@ impl Scene {
     /// the [`Light`](super::Light)'s alone.
     pub fn add_ball(&mut self, center: Vec3, radius: f32, intensity: Vec3) {
         let rings = SIDES / 2;
+        let emitted = intensity / (PI * radius * radius);
+        // The disc that one sees of it is as large as that of the sphere, to a thousandth.
+        let radius = radius * corner_of_disc();
         let mut positions = vec![[0.0, radius, 0.0]];
         for ring in 1..rings {
             let (height, from_axis) = (PI * ring as f32 / rings as f32).sin_cos();
@@ -40,7 +43,7 @@ impl Scene {
         }
         let moved = |position: [f32; 3]| (Vec3::from(position) + center).to_array();
         let positions = positions.into_iter().map(moved).collect();
-        self.add_lamp(positions, triangles, intensity / (PI * radius * radius), true);
+        self.add_lamp(positions, triangles, emitted, true);
     }
 
     /// Adds a flat rectangle that shines to one side, that of `u × v`, its edges; I is its radiant intensity straight ahead, its radiance
@@ -55,8 +58,7 @@ impl Scene {
     /// Adds a flat disc that shines to one side, along `axis` (any length but 0); I is its radiant intensity straight ahead, its radiance I/(π r²).
     pub fn add_disc(&mut self, center: Vec3, axis: Vec3, radius: f32, intensity: Vec3) {
         let (u, v) = axis.normalize_or(Vec3::Y).any_orthonormal_pair();
-        // As large as the circle.
-        let corner = radius * (TAU / SIDES as f32 / (TAU / SIDES as f32).sin()).sqrt();
+        let corner = radius * corner_of_disc();
         let at = |side: u32| {
             let (sine, cosine) = (TAU * side as f32 / SIDES as f32).sin_cos();
             (center + (u * cosine + v * sine) * corner).to_array()
@@ -73,11 +75,16 @@ impl Scene {
     }
 }
 
+/// Distance of the corners of a regular polygon from its middle, whose area is that of a circle of radius 1.
+fn corner_of_disc() -> f32 {
+    let side = TAU / SIDES as f32;
+    (side / side.sin()).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Interaction;
-    use crate::scene::Hit;
+    use crate::scene::{Hit, Interaction};
 
     fn areas_and_normals(scene: &Scene) -> (f32, Vec<(Vec3, Vec3)>) {
         let mesh = &scene.meshes[0];
@@ -92,7 +99,7 @@ mod tests {
         (area, normals)
     }
 
-    /// The ball's front points outwards everywhere, its area is that of the sphere to 2 %, and it lies within.
+    /// The ball's front points outwards everywhere, its area is that of the sphere to 2 %, and it is nowhere larger than rays to it allow for.
     #[test]
     fn a_ball_is_round() {
         let (center, mut scene) = (Vec3::new(1.0, 2.0, 3.0), Scene::new());
@@ -100,7 +107,7 @@ mod tests {
         let (area, normals) = areas_and_normals(&scene);
         assert!((area / PI - 1.0).abs() < 0.02, "{area}");
         for (at, normal) in normals {
-            assert!(normal.dot((at - center).normalize()) > 0.95 && at.distance(center) < 0.5);
+            assert!(normal.dot((at - center).normalize()) > 0.95 && at.distance(center) < 0.505);
         }
         assert_eq!(scene.validate(), Ok(()));
     }
