@@ -39,7 +39,8 @@ impl Sizes {
         if options.quick {
             Self { time_side: 48, error_side: 16, reference_samples: 16, meshes: &[(1.5, &[1.0])] }
         } else {
-            let meshes: &[(f32, &[f32])] = &[(0.75, &[0.75, 0.6, 0.45, 0.3]), (1.5, &[1.5, 1.2, 0.9, 0.6])];
+            let meshes: &[(f32, &[f32])] =
+                &[(0.75, &[0.75, 0.6, 0.55, 0.45, 0.3]), (1.5, &[1.5, 1.2, 1.1, 0.9, 0.6])];
             Self { time_side: 600, error_side: 40, reference_samples: 128, meshes }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::configuration::{Configuration, as_it_is, conventional, reference};
 use super::curve::{self, Tried, fastest_within};
+use super::lamps;
 use super::report::{Aim, Goal, Report, Table};
 use super::setup::{Frame, PAPER_LIGHTS, PAPER_TRIANGLES, Setup, forest, new_report, relative_rmse};
 use super::timing::Samples;
@@ -43,6 +44,15 @@ pub fn run(options: &BenchOptions, log: &dyn Fn(&str)) -> Result<Report, BenchEr
     }
     let configurations: Vec<Configuration> = chosen.iter().map(|tried| tried.configuration.clone()).collect();
     drop(backend);
+
+    log("lamps with a size");
+    lamps::measure(
+        &setup,
+        &Backend::build(options.backend, &setup.scene)?.backend,
+        if options.quick { 12 } else { 600 },
+        options,
+        &mut report,
+    )?;
 
     for (side, case_lights, goals, camera_goal) in CASES {
         let (side, case_lights) =

@@ -10,6 +10,7 @@ mod curve;
 mod headline;
 mod html;
 mod indirect;
+mod lamps;
 mod machine;
 mod markup;
 mod opened;

@@ -194,7 +194,9 @@ impl<A: Accel> Probe<'_, A> {
         };
         let ray = match light.kind {
             LightKind::Directional { direction } => Ray::new(at, -direction),
-            LightKind::Point | LightKind::Ball { .. } | LightKind::Spot { .. } => Ray::between(at, light.position),
+            LightKind::Point | LightKind::Ball { .. } | LightKind::Spot { .. } => {
+                Ray::between(at, light.position)
+            }
         };
         irradiance > 0.0 && !self.accel.occluded(&ray)
     }

@@ -1,5 +1,6 @@
 //! Lights as the inner loops take them: packed sixteen to a chunk, their falloff as a type, and the triangles that emit.
 
+mod chunk;
 mod emissive;
 mod emitters;
 mod falloff;
@@ -8,11 +9,12 @@ mod packed;
 mod shape;
 mod visibility;
 
+pub(crate) use chunk::LightChunk;
 pub use emissive::EmissiveTriangles;
 pub(crate) use emitters::emitters;
 pub use packed::PackedLights;
+pub(crate) use packed::{IncidentLights, SurfaceLanes};
 pub(crate) use shape::lamp_numbers;
-pub(crate) use packed::{IncidentLights, LightChunk, SurfaceLanes};
 pub(crate) use visibility::{SeenLights, VisibilityBits, expand_bits};
 // For tests and benches only.
 #[doc(hidden)]

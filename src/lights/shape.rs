@@ -11,7 +11,7 @@ use crate::sampling::hash_to_unit_cube;
 /// Parts that a ball is divided into, sectors of the disc that one sees of it, each of which is a light of its own. The first rays to a lamp, one for each part,
 /// have to find that it is hidden in part; of many lamps each matters less.
 pub(super) fn ball_parts(balls: usize) -> u8 {
-    (64 / balls.max(1)).clamp(1, 4) as u8
+    (32 / balls.max(1)).clamp(1, 4) as u8
 }
 
 /// What the radius of a ball is multiplied by where rays to it end.
@@ -55,7 +55,8 @@ impl LampShape {
                 let angle = TAU * (f32::from(part.0) + numbers.y) / f32::from(part.1);
                 let from_axis = radius * (1.0 / BEYOND_FACETS) * numbers.x.sqrt();
                 // From nearby less than a half of the ball is seen: rays that touch it do so closer to the eye than its middle.
-                let towards = (radius * radius / distance).max((radius * radius - from_axis * from_axis).sqrt());
+                let towards =
+                    (radius * radius / distance).max((radius * radius - from_axis * from_axis).sqrt());
                 let from_axis = from_axis.min((radius * radius - towards * towards).max(0.0).sqrt());
                 let (sine, cosine) = angle.sin_cos();
                 (to_light - direction * towards + (u * cosine + v * sine) * from_axis) * SHORTER

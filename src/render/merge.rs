@@ -160,7 +160,8 @@ impl SampleMerger {
         for &number in &*order {
             let group = &mut groups[number as usize];
             if group.count > 1 {
-                group.vertex.surface.shading_normal = group.normals.normalize_or(group.vertex.surface.shading_normal);
+                group.vertex.surface.shading_normal =
+                    group.normals.normalize_or(group.vertex.surface.shading_normal);
             }
             paths.vertices.push(group.vertex);
         }
@@ -284,14 +285,10 @@ mod tests {
         let mut merger = SampleMerger::new(PixelFootprint { eye: Vec3::Y, edge: 0.01 }, 1, 256);
         let mut paths = TilePaths::default();
         for leaf in 0..256 {
-            let surface = SurfacePoint::flat(Vec3::splat(leaf as f32), if leaf % 2 == 0 { Vec3::Y } else { -Vec3::Y });
-            let seen = Seen {
-                surface,
-                reflectance: Vec3::splat(0.5),
-                emission: Vec3::ZERO,
-                pixel: 0,
-                samples: 1,
-            };
+            let surface =
+                SurfacePoint::flat(Vec3::splat(leaf as f32), if leaf % 2 == 0 { Vec3::Y } else { -Vec3::Y });
+            let seen =
+                Seen { surface, reflectance: Vec3::splat(0.5), emission: Vec3::ZERO, pixel: 0, samples: 1 };
             merger.add(seen, [surface.position], &mut paths);
         }
         merger.finish(&mut paths);

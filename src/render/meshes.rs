@@ -89,7 +89,10 @@ impl LightMeshes {
     /// Makes the direct mesh one of these lights: it starts anew where emissive triangles are among them all at once, or no longer.
     pub(super) fn renew_lights(&mut self, lights: &PackedLights) {
         if self.has_emitters != lights.has_emitters() {
-            *self = Self { has_emitters: lights.has_emitters(), ..Self::new(self.direct.store().points.bounds()) };
+            *self = Self {
+                has_emitters: lights.has_emitters(),
+                ..Self::new(self.direct.store().points.bounds())
+            };
         }
     }
 

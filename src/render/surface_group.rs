@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::paths::PathVertex;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{LightChunk, lamp_numbers, PackedLights, SeenLights, SurfaceLanes, VisibilityBits};
+use crate::lights::{LightChunk, PackedLights, SeenLights, SurfaceLanes, VisibilityBits, lamp_numbers};
 use crate::simd::LANES;
 
 /// Up to 16 surface points, and the rays from them towards one light: the best packet that backends have for

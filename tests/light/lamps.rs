@@ -5,9 +5,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 use glam::Vec3;
 use lightmesh::image::Image;
 use lightmesh::scene::{Camera, Falloff, Light, Material, Scene};
-use lightmesh::settings::{
-    IndirectForm, IndirectSettings, Integrator, Resolve, Settings,
-};
+use lightmesh::settings::{IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
 
 use crate::common::{Builder, grey, light, picture, session, settings_at};
 
@@ -41,7 +39,11 @@ fn ground(place: Vec3, width: f32, index: usize) -> Vec3 {
 fn floor(builder: Builder, lights: Vec<Light>) -> Scene {
     let mut builder = builder;
     builder.quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, 0);
-    builder.scene(vec![grey(1.0), Material { emission: Vec3::ONE, ..grey(0.0) }], lights, Falloff::InverseSquare)
+    builder.scene(
+        vec![grey(1.0), Material { emission: Vec3::ONE, ..grey(0.0) }],
+        lights,
+        Falloff::InverseSquare,
+    )
 }
 
 /// A ball gives what a point gives, I cos/(π d²), as long as all of it is seen.
@@ -60,7 +62,11 @@ fn a_ball_lights_like_a_point() {
                 let way = at - ground(Vec3::ZERO, 1.0, index);
                 let expected = 5.0 * FRAC_1_PI * way.y / way.length().powi(3);
                 // Light is computed at the sample that is nearest to the middle.
-                assert!((pixel[0] / expected - 1.0).abs() < 5e-3, "{integrator}: {} for {expected}", pixel[0]);
+                assert!(
+                    (pixel[0] / expected - 1.0).abs() < 5e-3,
+                    "{integrator}: {} for {expected}",
+                    pixel[0]
+                );
             }
         }
     }

@@ -50,7 +50,7 @@ fn scene_text(folder: &Path, name: &str) -> String {
         let (position, intensity) = (&light["position"], &light["intensity_w_per_sr"]);
         let _ = write!(scene, "[[light]]\nposition = {position}\nintensity = {intensity}\n");
         if let Some(radius) = light["radius"].as_f64().filter(|&radius| radius > 0.0) {
-            let _ = write!(scene, "radius = {radius}\n");
+            let _ = writeln!(scene, "radius = {radius}");
         }
     }
     scene

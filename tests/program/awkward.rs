@@ -25,19 +25,7 @@ fn outcome(model: &Path, folder: &Path) -> Result<(), String> {
     let _ = fs::remove_file(&picture);
     let stderr = File::create(&log).map_err(|error| error.to_string())?;
     let mut child = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
-        // One ray per pixel: what is rendered here is compiled for tests, not for speed.
-        .args([
-            "render",
-            "--quiet",
-            "--resolution",
-            "16x12",
-            "--spp",
-            "1",
-            "--backend",
-            "bvh",
-            "--float",
-            "-o",
-        ])
+        .args(["render", "--quiet", "--resolution", "16x12", "--backend", "bvh", "--float", "-o"])
         .arg(&picture)
         .arg(model)
         .stdout(Stdio::null())

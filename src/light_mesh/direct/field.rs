@@ -118,7 +118,8 @@ fn trace_visibility<A: Accel>(
             for lane in 0..LANES {
                 let x = [packet.org_x[lane], packet.org_y[lane], packet.org_z[lane]];
                 // Of a lamp with a size each mesh point knows one place, other ones of other places: where they agree, all is seen or nothing.
-                [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]] = chunk.way(light, x, x.into(), 0);
+                [packet.dir_x[lane], packet.dir_y[lane], packet.dir_z[lane]] =
+                    chunk.way(light, x, x.into(), 0);
             }
             // The query leaves −∞ in blocked lanes.
             packet.tfar = [1.0; LANES];

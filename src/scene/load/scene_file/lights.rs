@@ -91,7 +91,12 @@ pub fn falloff(
 impl LightTable {
     /// Adds the light: a position makes a point light, a direction a directional one, both together a spot; a radius makes a ball of the first and a
     /// disc of the last, and a size a rectangle.
-    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
+    pub fn add(
+        table: &Spanned<Self>,
+        index: usize,
+        places: &Places,
+        scene: &mut Scene,
+    ) -> Result<(), LoadError> {
         let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
         let Self { position, direction, cone, radius, size, up, visible, intensity } = table.get_ref();
         let is_placed = position.is_some() && direction.is_some();
@@ -198,7 +203,12 @@ fn check_box(min: Vec3, max: Vec3, error: impl Fn(&str) -> LoadError) -> Result<
 impl LightBoxTable {
     /// Adds lights at random positions: per light, x, y and z are drawn, then three factors of the colour
     /// if that varies.
-    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
+    pub fn add(
+        table: &Spanned<Self>,
+        index: usize,
+        places: &Places,
+        scene: &mut Scene,
+    ) -> Result<(), LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_box[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
@@ -219,7 +229,12 @@ impl LightBoxTable {
 
 impl LightGridTable {
     /// Adds lights at the centres of the cells that the box is divided into; x runs fastest, z slowest.
-    pub fn add(table: &Spanned<Self>, index: usize, places: &Places, scene: &mut Scene) -> Result<(), LoadError> {
+    pub fn add(
+        table: &Spanned<Self>,
+        index: usize,
+        places: &Places,
+        scene: &mut Scene,
+    ) -> Result<(), LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light_grid[{index}]"), problem);
         let table = table.get_ref();
         let (min, max) = (table.min.0, table.max.0);
