@@ -253,6 +253,7 @@ impl Zone {
     }
 
     /// Calls `each(id, position)` for the points that may lie in the kernel of some point in a cell.
+    #[inline(always)]
     fn surround(&self, points: &PointSet, place: Vec3, side: f32, mut each: impl FnMut(u64, Vec3)) {
         let center = (place + 0.5) * side;
         // What rounding may add to R, generously.

@@ -121,6 +121,7 @@ impl PeriodicPoints {
     }
 
     /// Calls `each(id, position)` for all points of a box, and some beside it, in the order of [`gather`](Self::gather).
+    #[inline(always)]
     pub fn for_each_in_box(&self, min: Vec3, max: Vec3, each: impl FnMut(u64, Vec3)) {
         self.for_each_in_cells(self.cells_in(min, max), each);
     }

@@ -138,6 +138,7 @@ impl PointSet {
     }
 
     /// Calls `each(id, position)` for all points of a layer in a box, and perhaps some beside it, in a fixed order.
+    #[inline(always)]
     pub(super) fn for_each_in_box(
         &self,
         layer: usize,
