@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::choice::named;
-use super::parse;
+use super::parse::{self, Bounces};
 use crate::settings::{
     Estimator, Integrator, Neighbourhood, PixelFilter, Radius, Resolve, Settings, Spacing,
 };
@@ -55,10 +55,6 @@ pub struct Overrides {
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse::exposure)]
     pub exposure: Option<f32>,
 }
-
-/// How often light passes between surfaces; 0 is never.
-#[derive(Clone, Copy, Debug)]
-pub struct Bounces(pub u32);
 
 impl Overrides {
     /// The conventional tracer, whatever the scene file says.

@@ -4,7 +4,6 @@ use std::str::FromStr;
 
 use glam::Vec3;
 
-use super::overrides::Bounces;
 use crate::image::MAX_PIXELS;
 use crate::settings::{MAX_EXPOSURE, MAX_FILTER_WIDTH, Radius, Spacing};
 
@@ -73,6 +72,10 @@ pub fn radius(text: &str) -> Result<Radius, String> {
         None => positive(text).map(Radius::Units),
     }
 }
+
+/// How often light passes between surfaces; 0 is never.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounces(pub u32);
 
 /// Times that light passes between surfaces: 1 to 1000, or off.
 pub fn bounces(text: &str) -> Result<Bounces, String> {

@@ -95,7 +95,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether the ray can hit anything at all.
-    pub fn is_ray(&self, ray: &Ray) -> bool {
+    fn is_ray(&self, ray: &Ray) -> bool {
         is_valid_ray(ray, self.largest)
     }
 

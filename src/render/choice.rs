@@ -4,11 +4,8 @@
 //! not depend on time. A scene whose settings can be met by both ways is tried on a few tiles. What the trial evaluates of
 //! the light mesh stays known, so that it costs little where the light mesh is taken.
 
-use std::fmt;
-
 use glam::Vec3;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::error::RenderError;
 use super::frame::{BlockIntegrator, Frame};
@@ -16,6 +13,7 @@ use super::integrators::LightMeshIntegrator;
 use super::meshes::LightMeshes;
 use super::need::needed_points;
 use super::paths::{PathVertex, TilePaths};
+use super::reason::{Choice, Reason};
 use super::stats::{HybridError, RenderStats, ShadeCounters, timed};
 use super::surface_group::SurfaceGroup;
 use super::tiles::{TILE, Tile};
@@ -24,45 +22,6 @@ use crate::lights::PackedLights;
 use crate::scene::Camera;
 use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
 use crate::simd::LANES;
-
-/// What `auto` took, and why.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Choice {
-    /// What was taken.
-    pub integrator: Integrator,
-    /// Why.
-    pub reason: Reason,
-}
-
-/// Why an integrator was taken.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Reason {
-    /// The settings ask for what only a light mesh gives: soft shadows, or indirect light at points in free space.
-    Settings,
-    /// So many lights lie above the horizon of a surface point that the one way is known to be cheaper.
-    Lights(f32),
-    /// By trial: what the light mesh costs, as a share of conventional shading.
-    Trial(f32),
-    /// By trial: the share of the light that the light mesh is estimated to get wrong exceeds the tolerance.
-    Mistaken(f32),
-}
-
-impl fmt::Display for Choice {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: ", self.integrator)?;
-        match self.reason {
-            Reason::Settings => f.write_str("soft shadows, or indirect light in free space"),
-            Reason::Lights(lights) => write!(f, "{lights:.1} lights above the horizon of a surface point"),
-            Reason::Trial(share) => {
-                write!(f, "a light mesh is estimated at {:.0} % of conventional shading", 100.0 * share)
-            }
-            Reason::Mistaken(share) => {
-                write!(f, "a light mesh is estimated to get {:.1} % of the light wrong", 100.0 * share)
-            }
-        }
-    }
-}
 
 /// In images too small for a trial, from so many lights above the horizon on the light mesh is taken.
 const MANY_LIGHTS: f32 = 4.0;

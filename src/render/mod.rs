@@ -13,6 +13,7 @@ mod merge;
 mod meshes;
 mod need;
 mod paths;
+mod reason;
 mod session;
 mod shadow_edges;
 mod stats;
@@ -21,13 +22,13 @@ mod surface_light;
 mod tiles;
 mod trace;
 
-pub use choice::{Choice, Reason};
 pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
 pub use paths::{PathVertex, TilePaths};
+pub use reason::{Choice, Reason};
 pub use session::{Session, render};
 pub use stats::{
     HybridError, MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds,

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::choice::Choice;
+use super::reason::Choice;
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
 use crate::light_mesh::surface::SurfaceEvaluation;

@@ -37,7 +37,7 @@ pub struct Placed {
 }
 
 /// Builds one tree over meshes in world space; `meshes` come with the index of their instance.
-pub fn build_blas(meshes: &[(u32, &Arc<TriangleMesh>)], masks: &AlphaMasks) -> Result<Blas, BvhError> {
+fn build_blas(meshes: &[(u32, &Arc<TriangleMesh>)], masks: &AlphaMasks) -> Result<Blas, BvhError> {
     let mut parts = Vec::with_capacity(meshes.len());
     let mut total = 0u32;
     for (instance, mesh) in meshes {

@@ -174,7 +174,7 @@ impl<F: Copy> EdgeTest<F> {
 /// Edge functions, distance and interval in double precision, from sheared corners.
 #[cold]
 #[inline(never)]
-pub fn exact_hit(corners: [[f32; 3]; 3], shear_z: f32, t_near: f32, t_far: f32) -> Option<LaneHit> {
+fn exact_hit(corners: [[f32; 3]; 3], shear_z: f32, t_near: f32, t_far: f32) -> Option<LaneHit> {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));

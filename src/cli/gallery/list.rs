@@ -37,7 +37,7 @@ pub struct ListedImage {
 }
 
 /// What is added to the names of the files of the same image by the conventional tracer.
-pub const CONVENTIONAL: &str = "-conventional";
+const CONVENTIONAL: &str = "-conventional";
 
 impl ListedImage {
     /// Names of its files, each with whether it is the one by the conventional tracer.

@@ -14,7 +14,7 @@ pub const LAYER_SHIFT: u32 = 55;
 pub const MOST_LAYERS: usize = 1 << (64 - LAYER_SHIFT);
 
 /// Cells lie within ±`CELL_RANGE` of the anchor along each axis: 3 · 18 bits, and one for layouts with two points per cell.
-pub const CELL_RANGE: i32 = 1 << 17;
+const CELL_RANGE: i32 = 1 << 17;
 
 /// A scene may be as many spacings long; the rest of the range is left to neighbourhoods that reach beyond it.
 const LONGEST_SCENE: f32 = 120_000.0;

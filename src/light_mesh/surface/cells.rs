@@ -150,7 +150,7 @@ const MOST_DIVISIONS: usize = 4;
 
 /// How far above surfaces the lines run that tell whether two points see each other, in widths of a cell: so far that a surface which
 /// bends doesn't hide its own points.
-pub const LIFT: f32 = 0.08;
+const LIFT: f32 = 0.08;
 
 /// The line between two surface points, a little above both.
 #[inline(always)]
