@@ -69,7 +69,9 @@ impl Scene {
     }
 
     fn add_lamp(&mut self, positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, radiance: Vec3, lamp: bool) {
-        let material = Material { diffuse: Vec3::ZERO, emission: radiance, lamp, ..Material::default() };
+        let name = "lamp".to_owned();
+        let material =
+            Material { name, diffuse: Vec3::ZERO, emission: radiance, lamp, ..Material::default() };
         let material = self.add_material(material);
         self.add(TriangleMesh::new(positions, triangles).with_material(material));
     }

@@ -1,5 +1,7 @@
 //! What points, lights and geometry of a scene file come to.
 
+use std::f32::consts::PI;
+
 use lightmesh::scene::{LightKind, TriangleMaterials};
 
 use super::*;
@@ -20,6 +22,38 @@ fn random_lights_follow_the_documented_generator() {
     let first = scene.scene.lights[0];
     assert_eq!(first.position, Vec3::new(unit(0xe220a8), unit(0x6e789e), unit(0x06c45d)));
     assert_eq!((scene.scene.lights.len(), first.intensity), (2, Vec3::splat(1.5)));
+}
+
+/// A radius makes a ball of a point, which is seen unless told otherwise, and a disc of a spot; a size makes a rectangle. What is seen has the radiance of
+/// its intensity, and only the light of discs and rectangles is that of their triangles.
+#[test]
+fn lamps_have_their_size() {
+    let table = "[[light]]\nintensity = 6\nposition = [0, 3, 0]\n";
+    for (keys, lights, area, is_light) in [
+        ("radius = 0.5", 1, 4.0 * PI * 0.25, true),
+        ("radius = 0.5\nvisible = false", 1, 0.0, true),
+        ("direction = [0, -1, 0]\nradius = 0.5", 0, PI * 0.25, false),
+        ("direction = [0, -1, 0]\nsize = [3, 0.5]\nup = [1, 0, 0]", 0, 1.5, false),
+    ] {
+        let scene = loaded(&format!("{table}{keys}")).scene;
+        let balls = scene.lights.iter().filter(|light| light.kind == LightKind::Ball { radius: 0.5 });
+        assert_eq!((scene.lights.len(), balls.count()), (lights, lights), "{keys}");
+        let mut found = 0.0;
+        for mesh in &scene.meshes {
+            for triangle in 0..mesh.triangles.len() as u32 {
+                let [a, b, c] = mesh.corners(triangle);
+                let material = &scene.materials[mesh.materials.of(triangle) as usize];
+                if material.emission == Vec3::ZERO {
+                    continue;
+                }
+                found += 0.5 * (b - a).cross(c - a).length();
+                let disc = if keys.contains("size") { 1.5 } else { PI * 0.25 };
+                assert!((material.emission.x - 6.0 / disc).abs() < 1e-4, "{keys}: {}", material.emission);
+                assert_eq!((material.lamp, material.diffuse), (is_light, Vec3::ZERO), "{keys}");
+            }
+        }
+        assert!((found - area).abs() <= 0.02 * area, "{keys}: {found} for {area}");
+    }
 }
 
 /// Each channel of each light gets a factor of its own in [1 − v, 1 + v).

@@ -174,6 +174,20 @@ fn mistakes_name_file_line_and_key() {
         ),
         ("[[light]]\nposition = [0, 0, 0]", "1: light[0].intensity: is required"),
         (
+            "[[light]]\nintensity = 1\ndirection = [0, 1, 0]\nradius = 1",
+            "1: light[0]: radius needs a position",
+        ),
+        (
+            "[[light]]\nintensity = 1\nposition = [0, 1, 0]\nradius = 0",
+            "4: light[0].radius: must be greater than 0",
+        ),
+        ("[[light]]\nintensity = 1\nposition = [0, 1, 0]\nradius = 1e-30", "1: light[0]: the radiance"),
+        ("[[light]]\nintensity = 1\nposition = [0, 1, 0]\nsize = [1, 1]", "1: light[0]: size needs"),
+        (
+            "[[light]]\nintensity = 1\nposition = [0, 1, 0]\nvisible = true",
+            "1: light[0]: visible needs a radius",
+        ),
+        (
             "[[light_box]]\nmin = [0, 2, 0]\nmax = [1, 1, 1]\ncount = 3\nintensity = 1",
             "1: light_box[0]: min must not exceed max",
         ),

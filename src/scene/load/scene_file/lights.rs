@@ -1,5 +1,7 @@
 //! `[[light]]`, `[[light_box]]`, `[[light_grid]]`, and the falloff.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use serde::Deserialize;
 use toml::Spanned;
@@ -97,55 +99,59 @@ impl LightTable {
         places: &Places,
         scene: &mut Scene,
     ) -> Result<(), LoadError> {
-        let error = |problem: &str| Err(places.error(&table.span(), &format!("light[{index}]"), problem));
+        let error = |problem: &str| places.error(&table.span(), &format!("light[{index}]"), problem);
         let Self { position, direction, cone, radius, size, up, visible, intensity } = table.get_ref();
         let is_placed = position.is_some() && direction.is_some();
-        if cone.is_some() && !is_placed {
-            return error("cone needs position and direction");
-        }
-        if size.is_some() && !is_placed {
-            return error("size needs position and direction");
-        }
-        if size.is_some() && radius.is_some() || cone.is_some() && (size.is_some() || radius.is_some()) {
-            return error("radius, size and cone exclude each other");
-        }
-        if radius.is_some() && position.is_none() {
-            return error("radius needs a position");
-        }
-        if up.is_some() && size.is_none() {
-            return error("up belongs to a size");
-        }
-        if visible.is_some() && (radius.is_none() || is_placed) {
-            return error("visible belongs to balls: a radius without a direction");
+        let problem = if cone.is_some() && !is_placed {
+            Some("cone needs position and direction")
+        } else if size.is_some() && !is_placed {
+            Some("size needs position and direction")
+        } else if [cone.is_some(), size.is_some(), radius.is_some()]
+            .into_iter()
+            .filter(|given| *given)
+            .count()
+            > 1
+        {
+            Some("radius, size and cone exclude each other")
+        } else if radius.is_some() && position.is_none() {
+            Some("radius needs a position")
+        } else if up.is_some() && size.is_none() {
+            Some("up belongs to a size")
+        } else if visible.is_some() && direction.is_some() {
+            Some("visible belongs to balls, which have no direction")
+        } else {
+            None
+        };
+        if let Some(problem) = problem {
+            return Err(error(problem));
         }
         let [inner, outer] = cone.map_or([0.0, 45.0], |cone| cone.map(|angle| angle.0));
+        if !(0.0 <= inner && inner <= outer && outer <= 90.0) {
+            return Err(error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90"));
+        }
         let intensity = intensity.0;
         match (position.map(|position| position.0), direction.map(|direction| direction.0)) {
-            _ if !(0.0 <= inner && inner <= outer && outer <= 90.0) => {
-                error("cone takes two angles with 0 ≤ inner ≤ outer ≤ 90")
-            }
-            (None, None) => error("needs a position or a direction"),
+            (None, None) => return Err(error("needs a position or a direction")),
+            (None, Some(direction)) => scene.lights.push(Light::directional(direction, intensity)),
             (Some(position), None) => {
-                add_point(scene, position, radius.as_ref(), visible.unwrap_or(true), intensity);
-                Ok(())
+                let lamp = PointOrBall::new(radius.as_ref(), *visible, intensity, error)?;
+                lamp.add(scene, position, intensity);
             }
-            (Some(position), Some(direction)) => {
-                match (radius, size) {
-                    (Some(radius), _) => scene.add_disc(position, direction, radius.0, intensity),
-                    (_, Some([width, height])) => {
-                        let up = up.as_ref().map_or(Vec3::Y, |up| up.0);
-                        let (u, v) = edges(direction.normalize_or(Vec3::NEG_Y), up);
-                        scene.add_rectangle(position, u * width.0, v * height.0, intensity);
-                    }
-                    _ => scene.lights.push(Light::spot(position, direction, [inner, outer], intensity)),
+            (Some(position), Some(direction)) => match (radius, size) {
+                (Some(radius), _) => {
+                    check_radiance(intensity, PI * radius.0 * radius.0, error)?;
+                    scene.add_disc(position, direction, radius.0, intensity);
                 }
-                Ok(())
-            }
-            (None, Some(direction)) => {
-                scene.lights.push(Light::directional(direction, intensity));
-                Ok(())
-            }
+                (_, Some([width, height])) => {
+                    check_radiance(intensity, width.0 * height.0, error)?;
+                    let up = up.as_ref().map_or(Vec3::Y, |up| up.0);
+                    let (u, v) = edges(direction.normalize_or(Vec3::NEG_Y), up);
+                    scene.add_rectangle(position, u * width.0, v * height.0, intensity);
+                }
+                _ => scene.lights.push(Light::spot(position, direction, [inner, outer], intensity)),
+            },
         }
+        Ok(())
     }
 }
 
@@ -158,16 +164,48 @@ fn edges(direction: Vec3, up: Vec3) -> (Vec3, Vec3) {
     }
 }
 
-/// Adds a point light, or a ball if it has a radius.
-fn add_point(scene: &mut Scene, position: Vec3, radius: Option<&Positive>, visible: bool, intensity: Vec3) {
-    match radius {
-        Some(radius) => {
-            scene.lights.push(Light::ball(position, radius.0, intensity));
-            if visible {
-                scene.add_ball(position, radius.0, intensity);
-            }
+/// A point light, or a ball if it has a radius.
+struct PointOrBall {
+    radius: Option<f32>,
+    visible: bool,
+}
+
+impl PointOrBall {
+    /// With the keys of a table; `intensity` is that of its brightest light.
+    fn new(
+        radius: Option<&Positive>,
+        visible: Option<bool>,
+        intensity: Vec3,
+        error: impl Fn(&str) -> LoadError,
+    ) -> Result<Self, LoadError> {
+        if visible.is_some() && radius.is_none() {
+            return Err(error("visible needs a radius"));
         }
-        None => scene.lights.push(Light::point(position, intensity)),
+        let radius = radius.map(|radius| radius.0);
+        if let Some(radius) = radius {
+            check_radiance(intensity, PI * radius * radius, error)?;
+        }
+        Ok(Self { radius, visible: visible.unwrap_or(true) })
+    }
+
+    fn add(&self, scene: &mut Scene, position: Vec3, intensity: Vec3) {
+        let Some(radius) = self.radius else {
+            scene.lights.push(Light::point(position, intensity));
+            return;
+        };
+        scene.lights.push(Light::ball(position, radius, intensity));
+        if self.visible {
+            scene.add_ball(position, radius, intensity);
+        }
+    }
+}
+
+/// A lamp shows the radiance that its intensity comes to.
+fn check_radiance(intensity: Vec3, area: f32, error: impl Fn(&str) -> LoadError) -> Result<(), LoadError> {
+    if (intensity / area).is_finite() && area.is_finite() {
+        Ok(())
+    } else {
+        Err(error("the radiance, which is the intensity over the area, is beyond what a number holds"))
     }
 }
 
@@ -183,14 +221,6 @@ fn each(
         (None, Some(total)) => Ok(total.0 / count as f32),
         _ => Err(error("exactly one of intensity and total_intensity is required")),
     }
-}
-
-fn check_visible(
-    radius: Option<&Positive>,
-    visible: Option<bool>,
-    error: impl Fn(&str) -> LoadError,
-) -> Result<(), LoadError> {
-    if visible.is_some() && radius.is_none() { Err(error("visible needs a radius")) } else { Ok(()) }
 }
 
 fn check_box(min: Vec3, max: Vec3, error: impl Fn(&str) -> LoadError) -> Result<(), LoadError> {
@@ -216,12 +246,13 @@ impl LightBoxTable {
         let each = each(table.intensity, table.total_intensity, table.count.0, error)?;
         let variation = table.color_variation.map(|fraction| fraction.0).filter(|&fraction| fraction > 0.0);
         let mut random = SplitMix64::new(u64::from(table.seed));
-        check_visible(table.radius.as_ref(), table.visible, error)?;
+        let brightest = each * (1.0 + variation.unwrap_or(0.0));
+        let lamp = PointOrBall::new(table.radius.as_ref(), table.visible, brightest, error)?;
         for _ in 0..table.count.0 {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
-            add_point(scene, position, table.radius.as_ref(), table.visible.unwrap_or(true), each * tint);
+            lamp.add(scene, position, each * tint);
         }
         Ok(())
     }
@@ -246,11 +277,11 @@ impl LightGridTable {
         };
         let each = each(table.intensity, table.total_intensity, count, error)?;
         let cells = Vec3::new(nx as f32, ny as f32, nz as f32);
-        check_visible(table.radius.as_ref(), table.visible, error)?;
+        let lamp = PointOrBall::new(table.radius.as_ref(), table.visible, each, error)?;
         for i in 0..count {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
-            add_point(scene, position, table.radius.as_ref(), table.visible.unwrap_or(true), each);
+            lamp.add(scene, position, each);
         }
         Ok(())
     }
