@@ -161,7 +161,7 @@ impl Accel for EmbreeAccel {
         self.scene.occluded1(&single(ray))
     }
 
-    #[inline]
+    #[inline(always)]
     fn intersect_packet<const N: usize>(
         &self,
         active: LaneMask,
@@ -171,7 +171,7 @@ impl Accel for EmbreeAccel {
         self.scene.intersect_packet(active, packet, coherence == Coherence::Coherent);
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded_packet<const N: usize>(
         &self,
         active: LaneMask,

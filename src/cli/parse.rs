@@ -96,7 +96,7 @@ pub fn share(text: &str) -> Result<f32, String> {
 
 /// A distance between mesh points: one for all axes, one per axis, or `auto`.
 pub fn spacing(text: &str) -> Result<Spacing, String> {
-    if text == "auto" {
+    if text == Spacing::AUTO {
         return Ok(Spacing::Auto);
     }
     let numbers = text.split(',').map(positive).collect::<Result<Vec<_>, _>>()?;

@@ -185,3 +185,8 @@ pub enum Spacing {
     /// Per axis, scene units, > 0.
     Units(Vec3),
 }
+
+impl Spacing {
+    /// Name of [`Spacing::Auto`] where a number may stand.
+    pub(crate) const AUTO: &str = "auto";
+}

@@ -7,7 +7,7 @@ use std::ptr;
 
 use crate::bindings::{embree3 as v3, embree4 as v4};
 use crate::library::Api;
-use crate::packet::{INVALID_ID, RayHitPacket, RayPacket};
+use crate::packet::{INVALID_ID, RayHitPacket, RayPacket, half_of};
 use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 
@@ -201,7 +201,7 @@ impl Scene {
     /// Lanes that hit get `ray.tfar` and `hit` filled; all others stay as they are, so `geom_id` and
     /// `inst_id` should come as [`INVALID_ID`]. `coherent` is a hint for rays with neighbouring origins
     /// and directions, and changes no answer.
-    #[inline]
+    #[inline(always)]
     pub fn intersect_packet<const N: usize>(
         &self,
         active: u32,
@@ -209,13 +209,20 @@ impl Scene {
         coherent: bool,
     ) {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
+        if N == 16 && !self.is_native(16) && self.is_native(8) {
+            self.intersect_halves(active, packet, coherent);
+        } else {
+            self.intersect_whole(active, packet, coherent);
+        }
+    }
+
+    /// [`Scene::intersect_packet`] of a packet as it is.
+    #[inline(always)]
+    fn intersect_whole<const N: usize>(&self, active: u32, packet: &mut RayHitPacket<N>, coherent: bool) {
         let lanes = Valid::new(active, &mut packet.ray, self.largest_coordinate());
         if !self.is_native(N) {
-            return if N == 16 && self.is_native(8) {
-                self.intersect_halves(active, packet, coherent);
-            } else {
-                self.intersect_lanes(&lanes, packet);
-            };
+            self.intersect_lanes(&lanes, packet);
+            return;
         }
         let (valid, scene, packet) = (lanes.0.as_ptr(), self.handle(), ptr::from_mut(packet));
         // SAFETY: the scene is committed; flags and packet are aligned and of the layout of N lanes
@@ -244,7 +251,7 @@ impl Scene {
 
     /// The lanes of `active` that are blocked; `N` is 4, 8 or 16. Blocked lanes have their `tfar` set
     /// to −∞, all others stay as they are.
-    #[inline]
+    #[inline(always)]
     pub fn occluded_packet<const N: usize>(
         &self,
         active: u32,
@@ -252,7 +259,6 @@ impl Scene {
         coherent: bool,
     ) -> u32 {
         const { assert!(N == 4 || N == 8 || N == 16, "packets have 4, 8 or 16 rays") };
-        let lanes = Valid::new(active, packet, self.largest_coordinate());
         if N == 16
             && self.is_native(8)
             && (!self.is_native(16) || coherent && matches!(self.api(), Api::V3(_)))
@@ -260,8 +266,16 @@ impl Scene {
             // Processors with AVX2 and no AVX-512 have packets of 8. Where there are such of 16, Debian's 3.13.5 never
             // returns from some coherent occlusion queries: its AVX-512 code stores 16 bits of a lane mask and
             // reads back 64. Two coherent packets of 8 are faster than an incoherent one of 16.
-            return self.occluded_halves(active, packet, coherent);
+            self.occluded_halves(active, packet, coherent)
+        } else {
+            self.occluded_whole(active, packet, coherent)
         }
+    }
+
+    /// [`Scene::occluded_packet`] of a packet as it is.
+    #[inline(always)]
+    fn occluded_whole<const N: usize>(&self, active: u32, packet: &mut RayPacket<N>, coherent: bool) -> u32 {
+        let lanes = Valid::new(active, packet, self.largest_coordinate());
         if !self.is_native(N) {
             return self.occluded_lanes(&lanes, packet);
         }
@@ -291,7 +305,7 @@ impl Scene {
     }
 
     /// A packet of 16 as two of 8.
-    #[inline]
+    #[inline(always)]
     fn occluded_halves<const N: usize>(&self, active: u32, packet: &mut RayPacket<N>, coherent: bool) -> u32 {
         let mut mask = 0;
         for first in [0, 8] {
@@ -300,14 +314,14 @@ impl Scene {
                 continue;
             }
             let mut half = half_of(packet, first);
-            mask |= self.occluded_packet(lanes, &mut half, coherent) << first;
+            mask |= self.occluded_whole(lanes, &mut half, coherent) << first;
             packet.tfar[first..first + 8].copy_from_slice(&half.tfar);
         }
         mask
     }
 
     /// The same of a closest-hit query.
-    #[inline]
+    #[inline(always)]
     fn intersect_halves<const N: usize>(&self, active: u32, packet: &mut RayHitPacket<N>, coherent: bool) {
         for first in [0, 8] {
             let lanes = active >> first & 0xff;
@@ -317,7 +331,7 @@ impl Scene {
             let eight = first..first + 8;
             let mut half =
                 RayHitPacket { ray: half_of(&packet.ray, first), hit: RayHitPacket::<8>::empty().hit };
-            self.intersect_packet(lanes, &mut half, coherent);
+            self.intersect_whole(lanes, &mut half, coherent);
             packet.ray.tfar[eight.clone()].copy_from_slice(&half.ray.tfar);
             let (from, to) = (&half.hit, &mut packet.hit);
             for lane in (0..8).filter(|lane| from.geom_id[*lane] != INVALID_ID) {
@@ -361,22 +375,6 @@ impl Scene {
         }
         mask
     }
-}
-
-/// Eight lanes of a packet, from `first` on.
-#[inline(always)]
-fn half_of<const N: usize>(packet: &RayPacket<N>, first: usize) -> RayPacket<8> {
-    let eight = first..first + 8;
-    let mut half = RayPacket::empty();
-    half.org_x.copy_from_slice(&packet.org_x[eight.clone()]);
-    half.org_y.copy_from_slice(&packet.org_y[eight.clone()]);
-    half.org_z.copy_from_slice(&packet.org_z[eight.clone()]);
-    half.tnear.copy_from_slice(&packet.tnear[eight.clone()]);
-    half.dir_x.copy_from_slice(&packet.dir_x[eight.clone()]);
-    half.dir_y.copy_from_slice(&packet.dir_y[eight.clone()]);
-    half.dir_z.copy_from_slice(&packet.dir_z[eight.clone()]);
-    half.tfar.copy_from_slice(&packet.tfar[eight]);
-    half
 }
 
 fn ray_of_lane<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {

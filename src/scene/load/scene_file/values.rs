@@ -8,6 +8,8 @@ use glam::Vec3;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
+use crate::settings::Spacing;
+
 /// A number or an array of numbers, as written.
 enum Numbers {
     One(f64),
@@ -184,7 +186,7 @@ impl<'de> Deserialize<'de> for LengthsOrAuto {
 
             fn visit_str<E: de::Error>(self, value: &str) -> Result<Self::Value, E> {
                 match value {
-                    "auto" => Ok(LengthsOrAuto::Auto),
+                    Spacing::AUTO => Ok(LengthsOrAuto::Auto),
                     _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
                 }
             }
