@@ -152,19 +152,3 @@ impl<const N: usize> RayHitPacket<N> {
         }
     }
 }
-
-/// Eight lanes of a packet, from `first` on.
-#[inline(always)]
-pub(crate) fn half_of<const N: usize>(packet: &RayPacket<N>, first: usize) -> RayPacket<8> {
-    let eight = first..first + 8;
-    let mut half = RayPacket::empty();
-    half.org_x.copy_from_slice(&packet.org_x[eight.clone()]);
-    half.org_y.copy_from_slice(&packet.org_y[eight.clone()]);
-    half.org_z.copy_from_slice(&packet.org_z[eight.clone()]);
-    half.tnear.copy_from_slice(&packet.tnear[eight.clone()]);
-    half.dir_x.copy_from_slice(&packet.dir_x[eight.clone()]);
-    half.dir_y.copy_from_slice(&packet.dir_y[eight.clone()]);
-    half.dir_z.copy_from_slice(&packet.dir_z[eight.clone()]);
-    half.tfar.copy_from_slice(&packet.tfar[eight]);
-    half
-}

@@ -7,7 +7,7 @@ use std::ptr;
 
 use crate::bindings::{embree3 as v3, embree4 as v4};
 use crate::library::Api;
-use crate::packet::{INVALID_ID, RayHitPacket, RayPacket, half_of};
+use crate::packet::{INVALID_ID, RayHitPacket, RayPacket};
 use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 
@@ -375,6 +375,16 @@ impl Scene {
         }
         mask
     }
+}
+
+/// Eight lanes of a packet, from `first` on.
+#[inline(always)]
+fn half_of<const N: usize>(packet: &RayPacket<N>, first: usize) -> RayPacket<8> {
+    let eight = |lanes: &[f32; N]| std::array::from_fn(|lane| lanes[first + lane]);
+    let RayPacket { org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, tfar, .. } = packet;
+    let [org_x, org_y, org_z, tnear] = [org_x, org_y, org_z, tnear].map(eight);
+    let [dir_x, dir_y, dir_z, tfar] = [dir_x, dir_y, dir_z, tfar].map(eight);
+    RayPacket { org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, tfar, ..RayPacket::empty() }
 }
 
 fn ray_of_lane<const N: usize>(packet: &RayPacket<N>, lane: usize) -> Ray {
