@@ -92,8 +92,8 @@ impl Session {
         &self.backend
     }
 
-    /// Changes the intensity E_i of a light; 0 switches it off. What mesh points see stays known. Returns whether there is
-    /// such a light.
+    /// Changes the intensity E_i of a light; 0 switches it off. What mesh points see stays known, and what a ball's geometry shows stays as it is.
+    /// Returns whether there is such a light.
     ///
     /// # Errors
     /// [`SceneError`] for an intensity that is negative or not finite; then nothing has changed.

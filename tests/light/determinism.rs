@@ -1,6 +1,7 @@
 //! A picture depends on nothing but scene and settings: not on threads, blocks or timing, to the last bit.
 
 use glam::Vec3;
+use lightmesh::scene::LightKind;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::settings::{
     Estimator, IndirectForm, IndirectSettings, Integrator, Leaks, PointLayout, Resolve, Settings, Spacing,
@@ -13,6 +14,11 @@ fn scene() -> LoadedScene {
     let mut loaded = forest(3_000, 20);
     // Mirrors, so that there are paths of several points.
     loaded.scene.materials.iter_mut().for_each(|material| material.specular = Vec3::splat(0.3));
+    // Lamps with a size, of both kinds.
+    for light in loaded.scene.lights.iter_mut().step_by(3) {
+        light.kind = LightKind::Ball { radius: 0.2 };
+    }
+    loaded.scene.add_rectangle(Vec3::Y * 7.0, Vec3::X * 2.0, Vec3::Z, Vec3::splat(3.0));
     loaded
 }
 
@@ -39,6 +45,7 @@ fn variants() -> Vec<(&'static str, Settings)> {
         variant("invalidated points", &|s| s.shading.kernel.leaks = Leaks::Invalidate),
         variant("blue noise", &|s| s.mesh.direct.layout = PointLayout::BlueNoise { seed: 3 }),
         variant("hybrid", &|s| s.shading.resolve = Resolve::Trace),
+        variant("hybrid, emitters", &|s| (s.shading.resolve, s.shading.lambertian) = (Resolve::Trace, true)),
         variant("one bounce", &|s| s.mesh.indirect = indirect()),
         variant("three bounces", &|s| {
             s.mesh.indirect = indirect().map(|indirect| IndirectSettings { bounces: 3, ..indirect });
