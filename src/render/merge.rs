@@ -108,7 +108,9 @@ impl SampleMerger {
     pub fn add(&mut self, seen: Seen, origins: impl IntoIterator<Item = Vec3>, paths: &mut TilePaths) {
         if self.single {
             let Seen { surface, reflectance, pixel, .. } = seen;
-            paths.vertices.push(PathVertex { surface, reflectance, pixel });
+            if reflectance != Vec3::ZERO {
+                paths.vertices.push(PathVertex { surface, reflectance, pixel });
+            }
         } else {
             self.seen.push(seen);
             self.origins.extend(origins);
@@ -116,7 +118,7 @@ impl SampleMerger {
     }
 
     /// Turns the samples that were added since the last time into vertices, in the order in which their first samples were added. A
-    /// pixel's vertices don't depend on other pixels.
+    /// pixel's vertices don't depend on other pixels. What reflects nothing is no vertex: lamps, and surfaces that look the same in any light.
     ///
     /// The sample nearest to the middle of all stands for them: the middle itself may lie below a surface that isn't flat. First come the
     /// pixels' first vertices, then their second ones: those that follow each other should be neighbours.
@@ -134,6 +136,7 @@ impl SampleMerger {
                 break;
             }
         }
+        order.retain(|&number| groups[number as usize].vertex.reflectance != Vec3::ZERO);
         let mut end = paths.origins.len() as u32;
         for &number in &*order {
             let group = &mut groups[number as usize];
@@ -148,6 +151,10 @@ impl SampleMerger {
             let Group { positions: middle, nearest, vertex, next_origin, .. } = &mut groups[group as usize];
             let (own, others) = left.split_at(seen.samples as usize);
             left = others;
+            self.last_of[seen.pixel as usize] = NONE;
+            if vertex.reflectance == Vec3::ZERO {
+                continue;
+            }
             paths.origins[*next_origin as usize..][..own.len()].copy_from_slice(own);
             *next_origin += seen.samples;
             let distance = seen.surface.position.distance_squared(*middle);
@@ -155,7 +162,6 @@ impl SampleMerger {
                 *nearest = distance;
                 vertex.surface = seen.surface;
             }
-            self.last_of[seen.pixel as usize] = NONE;
         }
         for &number in &*order {
             let group = &mut groups[number as usize];
@@ -277,6 +283,24 @@ mod tests {
         assert_eq!(paths.vertices[0].surface.position.x, 0.02);
         let origins: Vec<f32> = paths.origins_of(0).iter().map(|origin| origin.x).collect();
         assert_eq!(origins, [0.0, 0.03, 0.02]);
+    }
+
+    /// What reflects nothing has no vertex, with one sample as with several, and takes none from what is seen beside it.
+    #[test]
+    fn black_is_no_vertex() {
+        for samples in [1, 16] {
+            let mut merger = SampleMerger::new(PixelFootprint { eye: Vec3::Y, edge: 0.01 }, 3, samples);
+            let mut paths = TilePaths::default();
+            for (pixel, reflectance) in [(0, 0.0), (1, 0.5), (2, 0.0)] {
+                let surface = SurfacePoint::flat(Vec3::X * pixel as f32, Vec3::Y);
+                let reflectance = Vec3::splat(reflectance);
+                let seen = Seen { surface, reflectance, emission: Vec3::ONE, pixel, samples: 1 };
+                merger.add(seen, [surface.position], &mut paths);
+            }
+            merger.finish(&mut paths);
+            assert_eq!(paths.vertices.iter().map(|vertex| vertex.pixel).collect::<Vec<_>>(), [1]);
+            assert_eq!(paths.origins.len(), if samples == 1 { 0 } else { 1 });
+        }
     }
 
     /// A pixel of foliage has a bounded number of vertices, and none of its samples is lost.
