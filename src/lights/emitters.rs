@@ -56,7 +56,7 @@ pub struct Emitter {
 
 /// A piece that is not in a cluster yet.
 #[derive(Clone)]
-struct Loose {
+struct LoosePiece {
     instance: u32,
     triangle: u32,
     /// Barycentric coordinates of the corners.
@@ -68,7 +68,7 @@ struct Loose {
     radiance: Vec3,
 }
 
-impl Loose {
+impl LoosePiece {
     fn power(&self) -> f32 {
         self.area * self.radiance.element_sum()
     }
@@ -119,7 +119,7 @@ impl Loose {
 /// The emissive triangles of a scene, as lights.
 pub fn emitters(scene: &Scene) -> Vec<Emitter> {
     let mut pieces = pieces(scene);
-    let total: f32 = pieces.iter().map(Loose::power).sum();
+    let total: f32 = pieces.iter().map(LoosePiece::power).sum();
     let fine = FINE * total * scene.bounds().extent().length();
     if pieces.is_empty() || !(fine > 0.0 && fine.is_finite()) {
         return Vec::new();
@@ -129,11 +129,11 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
         power * piece.longest().1.sqrt() > 0.5 * fine || power * 4.0 * EMITTERS.start as f32 > total
     });
     // By the main direction in which they shine: the pieces of a cluster have to face one way.
-    let side = |piece: &Loose| {
+    let side = |piece: &LoosePiece| {
         let axis = piece.normal.abs().max_position();
         2 * axis + usize::from(piece.normal[axis] < 0.0)
     };
-    let mut sides: [Vec<Loose>; 6] = Default::default();
+    let mut sides: [Vec<LoosePiece>; 6] = Default::default();
     pieces.into_iter().for_each(|piece| sides[side(&piece)].push(piece));
     let mut clusters: BinaryHeap<Cluster> = sides.into_iter().enumerate().filter_map(Cluster::of).collect();
     let mut next = clusters.len();
@@ -151,7 +151,7 @@ pub fn emitters(scene: &Scene) -> Vec<Emitter> {
 }
 
 /// All emissive triangles, once for each side that emits.
-fn pieces(scene: &Scene) -> Vec<Loose> {
+fn pieces(scene: &Scene) -> Vec<LoosePiece> {
     let shines = |material: &crate::scene::Material| material.emission != Vec3::ZERO && !material.lamp;
     if !scene.materials.iter().any(shines) {
         return Vec::new();
@@ -170,7 +170,7 @@ fn pieces(scene: &Scene) -> Vec<Loose> {
             let front = cross.normalize_or_zero() * if mirrored { -1.0 } else { 1.0 };
             [front, -front].into_iter().take(sides).filter_map(move |normal| {
                 let area = 0.5 * cross.length();
-                let mut piece = Loose {
+                let mut piece = LoosePiece {
                     instance,
                     triangle,
                     barycentric: [Vec2::ZERO, Vec2::X, Vec2::Y],
@@ -192,7 +192,7 @@ fn pieces(scene: &Scene) -> Vec<Loose> {
 }
 
 /// Cuts pieces in halves that are too large, as long as there are few.
-fn cut(pieces: &mut Vec<Loose>, scene: &Scene, is_large: impl Fn(&Loose) -> bool) {
+fn cut(pieces: &mut Vec<LoosePiece>, scene: &Scene, is_large: impl Fn(&LoosePiece) -> bool) {
     let most = pieces.len() + MOST_CUTS;
     let mut first = 0;
     while first < pieces.len() && pieces.len() < most {
@@ -216,25 +216,25 @@ struct Cluster {
     coarseness: f32,
     /// Different for each: of two that are equally coarse the older one comes first.
     number: usize,
-    pieces: Vec<Loose>,
+    pieces: Vec<LoosePiece>,
 }
 
 impl Cluster {
-    fn of((number, pieces): (usize, Vec<Loose>)) -> Option<Self> {
+    fn of((number, pieces): (usize, Vec<LoosePiece>)) -> Option<Self> {
         let mut bounds = Bounds::EMPTY;
         pieces.iter().flat_map(|piece| piece.corners).for_each(|corner| bounds.extend(corner));
-        let power: f32 = pieces.iter().map(Loose::power).sum();
+        let power: f32 = pieces.iter().map(LoosePiece::power).sum();
         let coarseness = power * bounds.extent().length();
         (!pieces.is_empty()).then_some(Self { coarseness, number, pieces })
     }
 
     /// The pieces on both sides of the middle along the longest way.
-    fn halves(mut self) -> [Vec<Loose>; 2] {
+    fn halves(mut self) -> [Vec<LoosePiece>; 2] {
         let mut bounds = Bounds::EMPTY;
         self.pieces.iter().for_each(|piece| bounds.extend(piece.middle()));
         let axis = bounds.extent().max_position();
         self.pieces.sort_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
-        let power: f32 = self.pieces.iter().map(Loose::power).sum();
+        let power: f32 = self.pieces.iter().map(LoosePiece::power).sum();
         let mut sum = 0.0;
         let half = self.pieces.iter().take_while(|piece| {
             sum += piece.power();
@@ -246,15 +246,15 @@ impl Cluster {
     }
 
     fn emitter(&self) -> Option<Emitter> {
-        let power: f32 = self.pieces.iter().map(Loose::power).sum();
+        let power: f32 = self.pieces.iter().map(LoosePiece::power).sum();
         let position = self.pieces.iter().map(|piece| piece.middle() * (piece.power() / power)).sum();
         let vector: Vec3 = self.pieces.iter().map(|piece| piece.normal * piece.power()).sum();
         let axis = vector.try_normalize()?;
-        let facing = |piece: &Loose| piece.area * piece.normal.dot(axis).max(0.0);
+        let facing = |piece: &LoosePiece| piece.area * piece.normal.dot(axis).max(0.0);
         let intensity = self.pieces.iter().map(|piece| piece.radiance * facing(piece)).sum();
         let area: f32 = self.pieces.iter().map(facing).sum();
         let mut sum = 0.0;
-        let with_share = |piece: &Loose| {
+        let with_share = |piece: &LoosePiece| {
             sum += piece.power();
             let [corner, b, c] = piece.corners;
             Piece { corner, edges: [b - corner, c - corner], up_to: sum / power }

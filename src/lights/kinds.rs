@@ -80,5 +80,22 @@ impl KindLanes {
 #[inline(always)]
 fn disc(cosine: f32, size: f32) -> f32 {
     let shrunk = 1.0 / (1.0 + size);
-    shrunk * (1.0 + 3.0 * (1.0 - cosine * cosine) * size * shrunk)
+    // q/(1 + q) as a difference, which is a number however near the point is.
+    shrunk * (1.0 + 3.0 * (1.0 - cosine * cosine) * (1.0 - shrunk))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact on the axis, 1 + q·(3 sin² − 1) for small discs, and finite in the middle of one.
+    #[test]
+    fn a_disc_is_its_formula_and_finite() {
+        assert_eq!(disc(1.0, 0.25), 0.8);
+        for cosine in [0.0f32, 0.5, 1.0] {
+            let expected = 1.0 + 1e-3 * (3.0 * (1.0 - cosine * cosine) - 1.0);
+            assert!((disc(cosine, 1e-3) - expected).abs() < 1e-5, "{cosine}");
+            assert!(disc(cosine, f32::INFINITY).is_finite(), "{cosine}");
+        }
+    }
 }
