@@ -9,7 +9,7 @@ use crate::accel::Backend;
 use crate::framing::choose_view;
 use crate::render::SessionError;
 use crate::scene::load::{LoadedScene, OpenedScene, open_scene};
-use crate::settings::ViewSettings;
+use crate::settings::{Limits, ViewSettings};
 
 /// The longer side of images of a quick run, pixels.
 const QUICK_SIDE: u32 = 32;
@@ -42,7 +42,9 @@ impl Opened {
         let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
         let backend = built?.backend;
         let OpenedScene { loaded, bare, .. } = choose_view(&opened, &backend).complete(opened);
-        let LoadedScene { scene, cameras, settings, .. } = loaded;
+        let LoadedScene { scene, cameras, mut settings, .. } = loaded;
+        // What is compared is one way with another, each as it is.
+        settings.limits = Limits::default();
         let camera = cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
         let setup = Setup { scene, camera, settings, load_seconds };
         Ok(Self { setup, backend, build_seconds, bare })

@@ -11,6 +11,7 @@ mod info;
 mod init;
 mod overrides;
 mod parse;
+mod partial;
 mod progress;
 mod render;
 mod shared;

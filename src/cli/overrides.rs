@@ -3,9 +3,9 @@
 use clap::Args;
 
 use super::choice::named;
-use super::parse::{self, Bounces};
+use super::parse::{self, Bounces, TimeLimit};
 use crate::settings::{
-    Estimator, Integrator, Neighbourhood, PixelFilter, Radius, Resolve, Settings, Spacing,
+    Estimator, Integrator, Limits, Neighbourhood, PixelFilter, Radius, Resolve, Settings, Spacing,
 };
 
 /// Settings of the scene file that flags can override.
@@ -51,6 +51,15 @@ pub struct Overrides {
     /// Width of the filter in pixels
     #[arg(long, value_name = "W", value_parser = parse::filter_width)]
     filter_width: Option<f32>,
+    /// Error that the picture may have: 5% or 0.05; 0 measures none [default: 5%]
+    #[arg(long, value_name = "SHARE", value_parser = parse::error_share)]
+    max_error: Option<f32>,
+    /// Stop after this time with the best whole picture so far: 30, 90s, 5m; 0 for no limit
+    #[arg(long, value_name = "TIME", value_parser = parse::time_limit)]
+    time_limit: Option<TimeLimit>,
+    /// Whole pictures to make one after the other, each better than the one before
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Limits::MOST_STEPS)))]
+    steps: Option<u32>,
     /// Brightness of PNG images in stops
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse::exposure)]
     pub exposure: Option<f32>,
@@ -78,7 +87,7 @@ impl Overrides {
     }
 
     fn apply_to_direct_light(&self, settings: &mut Settings) {
-        let Settings { view, mesh, shading, output } = settings;
+        let Settings { view, mesh, shading, output, limits } = settings;
         set(&mut shading.integrator, self.integrator);
         set(&mut shading.reference_samples, self.reference_samples);
         set(&mut shading.estimator, self.estimator);
@@ -92,6 +101,9 @@ impl Overrides {
         set(&mut view.filter, self.filter);
         view.filter_width = self.filter_width.or(view.filter_width);
         set(&mut output.exposure, self.exposure);
+        limits.max_error = self.max_error.or(limits.max_error);
+        set(&mut limits.time, self.time_limit.map(|limit| limit.0));
+        set(&mut limits.steps, self.steps);
     }
 }
 

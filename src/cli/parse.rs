@@ -1,6 +1,7 @@
 //! Numbers on the command line, with the ranges that they must lie in.
 
 use std::str::FromStr;
+use std::time::Duration;
 
 use glam::Vec3;
 
@@ -94,6 +95,34 @@ pub fn share(text: &str) -> Result<f32, String> {
     }
 }
 
+/// An error: a share, or per cent.
+pub fn error_share(text: &str) -> Result<f32, String> {
+    let wanted = "a share from 0 to 1, or per cent: 0.05, 5%";
+    let within = |limit: f64| move |value: f64| (0.0..=limit).contains(&value);
+    match text.trim().strip_suffix('%') {
+        Some(percent) => number::<f32>(percent, wanted, within(100.0)).map(|percent| percent / 100.0),
+        None => number(text, wanted, within(1.0)),
+    }
+}
+
+/// A time that a render may take, if there is a limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeLimit(pub Option<Duration>);
+
+/// A time, in seconds if it has no unit; 0 is no limit.
+pub fn time_limit(text: &str) -> Result<TimeLimit, String> {
+    let wanted = "a time such as 30, 90s, 5m or 1h";
+    let text = text.trim();
+    let units = [('s', 1.0), ('m', 60.0), ('h', 3600.0)];
+    let (count, unit) = units
+        .into_iter()
+        .find_map(|(letter, seconds)| text.strip_suffix(letter).map(|count| (count, seconds)))
+        .unwrap_or((text, 1.0));
+    let count: f64 = number(count, wanted, |count| count >= 0.0)?;
+    let time = Duration::try_from_secs_f64(count * unit).map_err(|_| format!("`{text}` is not {wanted}"))?;
+    Ok(TimeLimit((!time.is_zero()).then_some(time)))
+}
+
 /// A distance between mesh points: one for all axes, one per axis, or `auto`.
 pub fn spacing(text: &str) -> Result<Spacing, String> {
     if text == Spacing::AUTO {
@@ -140,6 +169,29 @@ mod tests {
         assert_eq!(spacing("1,2,3"), Ok(Spacing::Units(Vec3::new(1.0, 2.0, 3.0))));
         for wrong in ["0", "-1", "1e39", "nan", "1,2", "1,0,1"] {
             assert!(spacing(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// Per cent and shares are told apart, so that nobody asks for an error of five hundred per cent.
+    #[test]
+    fn errors_are_shares_or_per_cent() {
+        assert_eq!((error_share("5%"), error_share("0.05"), error_share("0")), (Ok(0.05), Ok(0.05), Ok(0.0)));
+        for wrong in ["5", "-1%", "101%", "nan", "%", ""] {
+            assert!(error_share(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// Times have units; 0 is no limit.
+    #[test]
+    fn times_have_units() {
+        let seconds = |count| Ok(TimeLimit(Some(Duration::from_secs_f64(count))));
+        assert_eq!(
+            (time_limit("30"), time_limit("1.5s"), time_limit("2m")),
+            (seconds(30.0), seconds(1.5), seconds(120.0))
+        );
+        assert_eq!((time_limit("1h"), time_limit("0")), (seconds(3600.0), Ok(TimeLimit(None))));
+        for wrong in ["-1", "1d", "1e300h", "s", "inf", ""] {
+            assert!(time_limit(wrong).is_err(), "{wrong}");
         }
     }
 

@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::error::{CommandError, Outcome};
 use super::overrides::Overrides;
+use super::partial::PartialPictures;
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend};
@@ -15,7 +16,7 @@ use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{exr::SampleType, tone::auto_exposure};
 use crate::render::{RenderStats, Session, StopToken};
 use crate::scene::load::{LoadedScene, OpenedScene};
-use crate::settings::Settings;
+use crate::settings::{Limits, Settings};
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
@@ -42,6 +43,9 @@ pub struct RenderArgs {
     /// Camera to look through, by name
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Write the images after every step, not only after the last one
+    #[arg(long)]
+    pub write_partial: bool,
     #[command(flatten)]
     pub overrides: Overrides,
 }
@@ -68,6 +72,7 @@ fn render_to(
 
     let mut opened = args.scene.open(&reporter)?;
     args.overrides.apply(&mut opened.loaded.settings);
+    opened.loaded.settings.limits.max_error.get_or_insert(Limits::USUAL_ERROR);
     seconds.load = start.elapsed().as_secs_f64();
 
     let stage = Instant::now();
@@ -104,7 +109,13 @@ fn render_to(
     let bar = reporter.bar("rendering");
     let (width, height) = settings.view.resolution;
     bar.set(0, u64::from(width) * u64::from(height));
-    let rendered = session.render_to(camera, &settings, &bar, &StopToken::default());
+    let sample_type = if args.float { SampleType::Float } else { SampleType::Half };
+    // What a bare model's exposure is, its picture says.
+    let exposure = (!bare || args.overrides.exposure.is_some()).then_some(settings.output.exposure);
+    let partial =
+        PartialPictures::new(&bar, if args.write_partial { targets } else { &[] }, sample_type, exposure);
+    let rendered = session.render_to(camera, &settings, &partial, &StopToken::default());
+    partial.finish()?;
     let (image, stats) =
         rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;
     bar.finish();
@@ -120,6 +131,7 @@ fn render_to(
     seconds.paths = stats.seconds.paths;
     seconds.mesh = stats.seconds.mesh;
     seconds.shade = stats.seconds.shade;
+    seconds.check = stats.seconds.check;
 
     let stage = Instant::now();
     if bare && args.overrides.exposure.is_none() {
@@ -132,7 +144,7 @@ fn render_to(
     }
     let (scene, backend) = (session.scene(), session.backend());
     let options = ImageOptions {
-        sample_type: if args.float { SampleType::Float } else { SampleType::Half },
+        sample_type,
         exposure: settings.output.exposure,
         metadata: metadata(backend, &settings, &stats),
     };
@@ -155,6 +167,7 @@ fn render_to(
         integrator: stats.integrator,
         choice: stats.choice,
         hybrid_error: stats.hybrid_error,
+        accuracy: stats.accuracy,
         rays: stats.rays,
         mesh_points: stats.mesh_points,
         light_mesh_bytes: stats.light_mesh_bytes,
@@ -166,6 +179,9 @@ fn render_to(
         target.write(format!("{}\n", serde_json::json!(stats_file)).as_bytes())?;
     }
     reporter.line(&summary(&stats_file));
+    if let Some(accuracy) = &stats_file.accuracy {
+        reporter.line(&accuracy.to_string());
+    }
     Ok(())
 }
 
@@ -185,7 +201,7 @@ fn summary(stats: &StatsFile) -> String {
     let seconds = &stats.seconds;
     let mut line = format!(
         "{} triangles, {} lights, {}×{} in {:.2} s ({} {}, {} threads; load {:.2}, build {:.2}, paths {:.2}, mesh {:.2}, \
-         shade {:.2}); {} shadow rays",
+         shade {:.2}, check {:.2}); {} shadow rays",
         stats.triangles,
         stats.lights,
         stats.resolution[0],
@@ -199,6 +215,7 @@ fn summary(stats: &StatsFile) -> String {
         seconds.paths,
         seconds.mesh,
         seconds.shade,
+        seconds.check,
         stats.rays.shadow,
     );
     let direct = &stats.mesh_points.direct;

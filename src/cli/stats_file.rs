@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::render::{Choice, HybridError, MeshCounters, RayCounters};
+use crate::render::{Accuracy, Choice, HybridError, MeshCounters, RayCounters};
 use crate::settings::Integrator;
 
 /// Contents of the file.
@@ -32,6 +32,8 @@ pub struct StatsFile {
     pub choice: Option<Choice>,
     /// The share of the light that hybrid shadows are estimated to get wrong; null without them.
     pub hybrid_error: HybridError,
+    /// How wrong the picture is; null where nobody asked.
+    pub accuracy: Option<Accuracy>,
     /// Rays by kind.
     pub rays: RayCounters,
     /// Counters of the light meshes.
@@ -70,6 +72,8 @@ pub struct Seconds {
     pub mesh: f64,
     /// Shading.
     pub shade: f64,
+    /// Measuring the error, and choosing mesh points by it.
+    pub check: f64,
     /// Writing the images.
     pub write: f64,
     /// All of it.

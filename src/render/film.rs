@@ -7,10 +7,13 @@ use super::paths::TilePaths;
 use super::tiles::{TILE, Tile};
 use crate::image::Image;
 
-/// Receives the tiles of an image as they are finished, each once, in any order and from any thread.
+/// Receives the tiles of an image as they are finished, each once for every picture that is made, in any order and from any thread.
 pub trait TileSink: Sync {
     /// A tile is finished: its pixels, row by row from the top left, linear RGB.
     fn tile(&self, tile: &Tile, pixels: &[[f32; 3]]);
+
+    /// A whole picture is finished; if there are steps to come, tiles of better ones follow.
+    fn picture(&self, _: &Image) {}
 }
 
 /// A sink that lets everything go.

@@ -1,6 +1,7 @@
 //! The stages of a frame, one after the other for each block of tiles: trace → need → evaluate → shade → film (method §9).
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -28,17 +29,31 @@ pub trait BlockIntegrator: Sync {
 
 /// Stops a render between two tiles. Clones stop the same renders.
 #[derive(Clone, Debug, Default)]
-pub struct StopToken(std::sync::Arc<AtomicBool>);
+pub struct StopToken {
+    stopped: std::sync::Arc<AtomicBool>,
+    /// When a render stops by itself.
+    deadline: Option<Instant>,
+}
 
 impl StopToken {
     /// Stops the renders that were given this token or a clone of it.
     pub fn stop(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.stopped.store(true, Ordering::Relaxed);
     }
 
-    /// Whether [`StopToken::stop`] was called.
+    /// Whether [`StopToken::stop`] was called, or a deadline has passed.
     pub fn is_stopped(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.stopped.load(Ordering::Relaxed) || self.is_late()
+    }
+
+    /// The same token, which stops by itself at a time as well.
+    pub(super) fn with_deadline(&self, deadline: Option<Instant>) -> Self {
+        Self { stopped: self.stopped.clone(), deadline }
+    }
+
+    /// Whether the deadline has passed.
+    pub(super) fn is_late(&self) -> bool {
+        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// # Errors

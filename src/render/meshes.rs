@@ -29,6 +29,13 @@ pub struct LightMeshes {
     indirect_identity: Option<IndirectIdentity>,
 }
 
+/// The meshes of indirect light, while others are rendered.
+pub(super) struct IndirectLight {
+    indirect: Option<IndirectMesh>,
+    surface: Option<SurfaceMesh>,
+    identity: Option<IndirectIdentity>,
+}
+
 /// What the values of an indirect mesh follow from beside geometry and materials: others make it another mesh.
 #[derive(Clone, Debug, PartialEq)]
 struct IndirectIdentity {
@@ -154,6 +161,21 @@ impl LightMeshes {
             hybrid,
             tolerance: shading.tolerance,
         })
+    }
+
+    /// Takes the meshes of indirect light away, to be [put back](Self::put_indirect_back).
+    pub(super) fn set_indirect_aside(&mut self) -> IndirectLight {
+        IndirectLight {
+            indirect: self.indirect.take(),
+            surface: self.surface.take(),
+            identity: self.indirect_identity.take(),
+        }
+    }
+
+    /// Puts back what was [set aside](Self::set_indirect_aside).
+    pub(super) fn put_indirect_back(&mut self, aside: IndirectLight) {
+        (self.indirect, self.surface, self.indirect_identity) =
+            (aside.indirect, aside.surface, aside.identity);
     }
 
     /// Forgets what depends on the lights' intensities; visibility stays.

@@ -4,10 +4,12 @@
 //! [`trace_paths`], [`needed_points`], [`DirectMesh::evaluate`](crate::light_mesh::direct::DirectMesh::evaluate),
 //! [`shade_tile`] with an [integrator](integrators), and [`resolve`].
 
+mod accuracy;
 mod choice;
 mod error;
 mod film;
 mod frame;
+mod held_out;
 pub mod integrators;
 mod merge;
 mod meshes;
@@ -17,11 +19,13 @@ mod reason;
 mod session;
 mod shadow_edges;
 mod stats;
+mod steps;
 mod surface_group;
 mod surface_light;
 mod tiles;
 mod trace;
 
+pub use accuracy::{Accuracy, Ending, ErrorEstimate, Measure};
 pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};

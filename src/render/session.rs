@@ -10,6 +10,7 @@ use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceI
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::stats::{RenderStats, timed};
+use super::steps::View;
 use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
 use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
@@ -181,11 +182,11 @@ fn render_world<A: Accel>(
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
     camera.validate()?;
-    render_frame(Frame::new(world, camera, &settings.view, sink, stop), camera, settings, meshes)
+    View { world, camera, sink, stop }.render(settings, meshes)
 }
 
 /// Renders with the integrator that the settings name.
-fn render_frame<A: Accel>(
+pub(super) fn render_frame<A: Accel>(
     mut frame: Frame<A>,
     camera: &Camera,
     settings: &Settings,
@@ -227,7 +228,8 @@ fn render_frame<A: Accel>(
             frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
         }
         (_, None) => {
-            let direct = ConventionalIntegrator { world, scale: settings.shading.direct_scale() };
+            let scale = settings.shading.direct_scale();
+            let direct = ConventionalIntegrator { world, scale, indirect: None };
             frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
         }
     };

@@ -2,6 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
+use super::accuracy::Accuracy;
 use super::reason::Choice;
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
@@ -17,6 +18,8 @@ pub struct StageSeconds {
     pub mesh: f64,
     /// Shading.
     pub shade: f64,
+    /// Measuring the error, and choosing mesh points by it.
+    pub check: f64,
 }
 
 /// Rays by kind.
@@ -32,6 +35,17 @@ pub struct RayCounters {
     pub indirect: u64,
     /// Rays that look whether mesh points lie inside of geometry.
     pub inside: u64,
+}
+
+impl RayCounters {
+    /// Adds other rays.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.camera += other.camera;
+        self.reflection += other.reflection;
+        self.shadow += other.shadow;
+        self.indirect += other.indirect;
+        self.inside += other.inside;
+    }
 }
 
 /// Counters of one light mesh in one render.
@@ -73,6 +87,8 @@ pub struct RenderStats {
     pub hybrid_error: HybridError,
     /// Bytes held by the light meshes afterwards.
     pub light_mesh_bytes: u64,
+    /// How wrong the picture is; `None` where nobody asked.
+    pub accuracy: Option<Accuracy>,
 }
 
 /// The error that hybrid shadows estimate of themselves, over some surface points.
@@ -124,6 +140,18 @@ impl RenderStats {
         self.mesh_points.direct.evaluated += evaluation.evaluated;
         self.rays.shadow += evaluation.shadow;
         self.rays.inside += evaluation.inside;
+    }
+
+    /// Adds what pictures took that were made before this one.
+    pub(super) fn add_earlier(&mut self, before: &Self) {
+        let Self { seconds, rays, mesh_points, .. } = self;
+        seconds.paths += before.seconds.paths;
+        seconds.mesh += before.seconds.mesh;
+        seconds.shade += before.seconds.shade;
+        seconds.check += before.seconds.check;
+        rays.add(&before.rays);
+        mesh_points.direct.evaluated += before.mesh_points.direct.evaluated;
+        mesh_points.indirect.evaluated += before.mesh_points.indirect.evaluated;
     }
 
     /// Adds what the evaluation of a surface mesh took.

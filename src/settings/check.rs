@@ -1,5 +1,6 @@
 //! What settings made in memory must fulfil; those of scene files and flags are checked where they are read.
 
+use super::limits::Limits;
 use super::mesh::{PointLayout, PointSettings, Spacing};
 use super::settings::Settings;
 use super::shading::Radius;
@@ -37,7 +38,7 @@ impl Settings {
     /// # Errors
     /// The first setting that is out of its range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let Self { view, mesh, shading, .. } = self;
+        let Self { view, mesh, shading, limits, .. } = self;
         let (width, height) = view.resolution;
         let pixels = u64::from(width) * u64::from(height);
         check(
@@ -62,6 +63,11 @@ impl Settings {
             check(name, "be finite and above 0", length, is_length(length))
         };
         radius("shading.kernel.radius", shading.kernel.radius)?;
+        if let Some(error) = limits.max_error {
+            check("limits.max_error", "be a number from 0 up", error, error >= 0.0 && error.is_finite())?;
+        }
+        let steps = limits.steps;
+        check("limits.steps", "lie in 1 to 8", steps, (1..=Limits::MOST_STEPS).contains(&steps))?;
         mesh.direct.check()?;
         if let Some(indirect) = &mesh.indirect {
             radius("shading.indirect.kernel.radius", shading.indirect.kernel.radius)?;
@@ -116,6 +122,8 @@ mod tests {
         assert_eq!(refused(&|s| s.shading.reference_samples = 0), "shading.reference_samples");
         assert_eq!(refused(&|s| s.shading.tolerance = -0.01), "shading.tolerance");
         assert_eq!(refused(&|s| s.shading.kernel.radius = Radius::Units(f32::NAN)), "shading.kernel.radius");
+        assert_eq!(refused(&|s| s.limits.max_error = Some(f32::NAN)), "limits.max_error");
+        assert_eq!(refused(&|s| s.limits.steps = 0), "limits.steps");
         assert_eq!(refused(&|s| s.mesh.direct.spacing = Spacing::Units(Vec3::ZERO)), "points.spacing");
         assert_eq!(
             refused(&|s| s.mesh.direct.layout = PointLayout::List(Vec::new().into())),

@@ -5,6 +5,7 @@
 //! files are written.
 
 mod check;
+mod limits;
 mod mesh;
 mod names;
 mod output;
@@ -13,6 +14,7 @@ mod shading;
 mod view;
 
 pub use check::SettingsError;
+pub use limits::Limits;
 pub use mesh::{
     IndirectForm, IndirectSettings, LayoutName, MeshSettings, PointLayout, PointSettings, Region, Spacing,
 };

@@ -1,5 +1,6 @@
 //! All settings of a render, in one value.
 
+use super::limits::Limits;
 use super::mesh::{IndirectForm, IndirectSettings, MeshSettings, Spacing};
 use super::output::OutputSettings;
 use super::shading::ShadingSettings;
@@ -16,6 +17,8 @@ pub struct Settings {
     pub shading: ShadingSettings,
     /// How files are written.
     pub output: OutputSettings,
+    /// When the picture is good enough.
+    pub limits: Limits,
 }
 
 impl Settings {

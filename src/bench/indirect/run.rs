@@ -109,7 +109,7 @@ fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Result<I
     })
 }
 
-fn total(StageSeconds { paths, mesh, shade }: &StageSeconds) -> f64 {
+fn total(StageSeconds { paths, mesh, shade, .. }: &StageSeconds) -> f64 {
     paths + mesh + shade
 }
 
@@ -135,7 +135,7 @@ fn table(curves: &[IndirectCurve]) -> Table {
     );
     for curve in curves {
         for point in &curve.points {
-            let StageSeconds { paths, mesh, shade } = point.stages;
+            let StageSeconds { paths, mesh, shade, .. } = point.stages;
             let seconds = [point.seconds, paths, mesh, shade].map(|seconds| format!("{seconds:.3}"));
             let rays = [point.rays.indirect, point.rays.shadow];
             let rays = rays.map(|count| format!("{:.2}", count as f64 / 1e6));

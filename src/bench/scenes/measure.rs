@@ -134,5 +134,6 @@ fn stage_medians(runs: &[Run]) -> StageSeconds {
         paths: median(|seconds| seconds.paths),
         mesh: median(|seconds| seconds.mesh),
         shade: median(|seconds| seconds.shade),
+        check: median(|seconds| seconds.check),
     }
 }

@@ -77,7 +77,7 @@ pub fn tables(scenes: &[SceneResult]) -> Vec<Table> {
         ];
         for (way, (seconds, counters, frame)) in WAYS.iter().zip(ways) {
             let row = |cells: Vec<String>| [vec![scene.name.clone(), way.to_string()], cells].concat();
-            let StageSeconds { paths, mesh, shade } = *seconds;
+            let StageSeconds { paths, mesh, shade, .. } = *seconds;
             stages.rows.push(row([paths, mesh, shade, frame].map(|value| format!("{value:.4}")).to_vec()));
             let RayCounters { camera, reflection, shadow, indirect, inside } = *counters;
             let counts = [camera, reflection, shadow, indirect, inside];

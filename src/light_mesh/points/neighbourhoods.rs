@@ -8,7 +8,9 @@ use super::neighbours::Neighbours;
 use super::point_set::{MeshError, PointSet};
 use crate::Bounds;
 use crate::scene::{PixelFootprint, SurfacePoint};
-use crate::settings::{IndirectSettings, KernelSettings, Neighbourhood, PointSettings, Radius, Spacing};
+use crate::settings::{
+    IndirectSettings, KernelSettings, Neighbourhood, PointLayout, PointSettings, Radius, Spacing,
+};
 
 /// A part of space with points and a radius of its own.
 struct Zone {
@@ -42,6 +44,8 @@ pub struct Neighbourhoods {
     rings: Vec<f32>,
     neighbourhood: Neighbourhood,
     hemisphere: bool,
+    /// Points per cell of the layout.
+    per_cell: f32,
 }
 
 impl Neighbourhoods {
@@ -89,7 +93,9 @@ impl Neighbourhoods {
             let radius = region.radius.unwrap_or_else(|| radius_for(spacing));
             zones.push(zone(Some(region.bounds), spacing, radius)?);
         }
-        Ok(Self { zones, eye, rings, neighbourhood: kernel.neighbourhood, hemisphere: kernel.hemisphere })
+        let (neighbourhood, hemisphere) = (kernel.neighbourhood, kernel.hemisphere);
+        let per_cell = if settings.layout == PointLayout::BodyCentred { 2.0 } else { 1.0 };
+        Ok(Self { zones, eye, rings, neighbourhood, hemisphere, per_cell })
     }
 
     /// About how many points the neighbourhoods of surface points can reach.
@@ -128,6 +134,25 @@ impl Neighbourhoods {
             }
         }
         found
+    }
+
+    /// Spacing where neither rings nor regions have their own, along the longest axis.
+    pub(crate) fn spacing(&self) -> Vec3 {
+        Vec3::splat(self.zones.first().map_or(0.0, |zone| zone.spacing))
+    }
+
+    /// R where neither rings nor regions have their own.
+    pub(crate) fn radius(&self) -> f32 {
+        self.zones.first().map_or(0.0, |zone| zone.radius)
+    }
+
+    /// About how many points D_y has there.
+    pub(crate) fn points_around(&self) -> f32 {
+        self.zones.first().map_or(0.0, |zone| {
+            let ball =
+                4.0 / 3.0 * std::f32::consts::PI * (zone.radius / zone.spacing).powi(3) * self.per_cell;
+            if self.hemisphere { 0.5 * ball } else { ball }
+        })
     }
 
     /// Spacing of the mesh points at a position.

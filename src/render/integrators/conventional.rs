@@ -3,7 +3,9 @@
 use glam::Vec3;
 use pulp::NullaryFnOnce;
 
+use super::light_mesh::add_indirect;
 use crate::accel::Accel;
+use crate::light_mesh::indirect::IndirectView;
 use crate::lights::VisibilityBits;
 use crate::render::frame::BlockIntegrator;
 use crate::render::paths::TilePaths;
@@ -20,6 +22,8 @@ pub struct ConventionalIntegrator<'a, A> {
     pub world: World<'a, A>,
     /// What direct light is multiplied by before k_d.
     pub scale: f32,
+    /// Indirect light in free space, if it is to be added.
+    pub(in crate::render) indirect: Option<IndirectView<'a>>,
 }
 
 impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
@@ -44,7 +48,7 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
     #[inline(always)]
     fn call(self) -> ShadeCounters {
         let Self { integrator, tile, paths, light } = self;
-        let ConventionalIntegrator { world: World { accel, lights, .. }, scale } = integrator;
+        let ConventionalIntegrator { world: World { accel, lights, .. }, scale, indirect } = integrator;
         let mut shadow_rays = 0;
         let mut visibility = TileVisibility::new(paths.vertices.len(), lights);
         for (first, members) in (0..).step_by(LANES).zip(paths.vertices.chunks(LANES)) {
@@ -68,6 +72,10 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
         }
         shadow_rays += smooth_shadow_edges(*accel, lights, tile, paths, &visibility, *scale, light);
         light.iter_mut().for_each(|light| *light *= *scale);
-        ShadeCounters { shadow_rays, ..ShadeCounters::default() }
+        let mut counters = ShadeCounters { shadow_rays, ..ShadeCounters::default() };
+        if let Some(indirect) = indirect {
+            add_indirect(*accel, *indirect, paths, light, &mut counters);
+        }
+        counters
     }
 }

@@ -6,7 +6,7 @@ use pulp::NullaryFnOnce;
 use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectMesh;
-use crate::light_mesh::indirect::IndirectMesh;
+use crate::light_mesh::indirect::{IndirectMesh, IndirectView};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
 use crate::render::meshes::MeshInterpolation;
@@ -70,16 +70,27 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
 
         light.iter_mut().for_each(|light| *light *= interpolation.direct_scale);
         if let (Some(indirect), Some(view)) = (indirect, &interpolation.indirect) {
-            let indirect = indirect.view(view);
-            let mut scratch = LookupScratch::for_tile();
-            for (vertex, light) in vertices.iter().zip(&mut *light) {
-                *light += indirect.illumination(accel, &vertex.surface, &mut scratch);
-            }
-            counters.shadow_rays += scratch.rays;
-            counters.indirect_fallbacks = scratch.fallbacks;
+            add_indirect(accel, indirect.view(view), paths, light, &mut counters);
         }
         counters
     }
+}
+
+/// Adds the indirect light of a mesh in free space to that of the vertices of a tile.
+#[inline(always)]
+pub(super) fn add_indirect<A: Accel>(
+    accel: &A,
+    indirect: IndirectView,
+    paths: &TilePaths,
+    light: &mut [Vec3],
+    counters: &mut ShadeCounters,
+) {
+    let mut scratch = LookupScratch::for_tile();
+    for (vertex, light) in paths.vertices.iter().zip(light) {
+        *light += indirect.illumination(accel, &vertex.surface, &mut scratch);
+    }
+    counters.shadow_rays += scratch.rays;
+    counters.indirect_fallbacks = scratch.fallbacks;
 }
 
 impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {

@@ -1,15 +1,17 @@
 //! `[render]`, and `preset`.
 
+use std::time::Duration;
+
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
-use super::values::{Count, FilterWidth, Fraction, Stops};
+use super::values::{Count, FilterWidth, Fraction, NonNegative, Stops};
 use crate::image::MAX_PIXELS;
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
 use crate::settings::{
-    Estimator, IndirectSettings, Integrator, PixelFilter, Radius, Resolve, Settings, named_enum,
+    Estimator, IndirectSettings, Integrator, Limits, PixelFilter, Radius, Resolve, Settings, named_enum,
 };
 
 /// `[render]`
@@ -26,6 +28,9 @@ pub struct RenderTable {
     weight_threshold: Option<Fraction>,
     exposure: Option<Stops>,
     lambertian: Option<bool>,
+    max_error: Option<Fraction>,
+    time_limit: Option<NonNegative>,
+    steps: Option<Count<{ Limits::MOST_STEPS }>>,
 }
 
 named_enum! {
@@ -67,7 +72,13 @@ impl RenderTable {
             }
             settings.view.resolution = (width, height);
         }
-        let Settings { view, shading, output, .. } = settings;
+        let Settings { view, shading, output, limits, .. } = settings;
+        limits.max_error = self.max_error.map_or(limits.max_error, |share| Some(share.0));
+        // What is longer than a render may ever take is no limit, nor is 0.
+        let time =
+            |seconds: NonNegative| Duration::try_from_secs_f32(seconds.0).ok().filter(|time| !time.is_zero());
+        limits.time = self.time_limit.map_or(limits.time, time);
+        limits.steps = self.steps.map_or(limits.steps, |count| count.0);
         shading.integrator = self.integrator.unwrap_or(shading.integrator);
         shading.reference_samples = self.reference_samples.map_or(shading.reference_samples, |count| count.0);
         shading.lambertian = self.lambertian.unwrap_or(shading.lambertian);

@@ -1,0 +1,196 @@
+//! How wrong a picture is, as far as parts of it tell that are known better.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// How differences of pixels make an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// Root of the mean squared difference, over the mean of the picture: averaged shadows are wrong a little everywhere.
+    Rmse,
+    /// Mean absolute difference over the mean of the picture, the share of the light that is in a wrong place: traced shadows are right but for a
+    /// few pixels, and who holds out one in a hundred knows nothing of the squares of the rest.
+    Absolute,
+}
+
+/// An estimate of the error of a picture's direct light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorEstimate {
+    /// What it is an error of.
+    pub measure: Measure,
+    /// The error.
+    pub error: f32,
+    /// Half the width of the interval in which it lies with 95 % confidence.
+    pub confidence: f32,
+    /// The error of the worst part, over the mean of the picture.
+    pub worst: f32,
+    /// Number of the parts that were held out.
+    pub parts: u32,
+    /// Their pixels.
+    pub pixels: u64,
+    /// Rays that the truth took.
+    pub rays: u64,
+}
+
+/// What ended a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// The error is below the limit with 95 % confidence.
+    Error,
+    /// The settings leave nothing open by which the error could be made smaller.
+    Settings,
+    /// The finest light mesh that is tried.
+    Finest,
+    /// The time is over.
+    Time,
+    /// Every shadow ray was traced: there is no error but that of pixels' samples.
+    Exact,
+}
+
+/// How wrong a picture is, and why it was left at that.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// The error that was asked for.
+    pub asked: f32,
+    /// What was found; `None` where nothing was measured.
+    pub found: Option<ErrorEstimate>,
+    /// What ended the render.
+    pub ending: Ending,
+    /// About how many shadow rays half the error would take.
+    pub rays_for_half: Option<u64>,
+}
+
+/// What is known of a part of a picture, summed over its pixels and the three colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PartError {
+    /// Differences, squared or absolute.
+    pub wrong: f64,
+    /// What the picture shows.
+    pub shown: f64,
+    /// What it should show.
+    pub truth: f64,
+    /// Pixels times three.
+    pub values: f64,
+}
+
+impl PartError {
+    fn add(&mut self, other: &Self) {
+        self.wrong += other.wrong;
+        self.shown += other.shown;
+        self.truth += other.truth;
+        self.values += other.values;
+    }
+
+    /// Without another one that is part of it.
+    fn without(&self, other: &Self) -> Self {
+        Self {
+            wrong: self.wrong - other.wrong,
+            shown: self.shown - other.shown,
+            truth: self.truth - other.truth,
+            values: self.values - other.values,
+        }
+    }
+
+    /// What is wrong with a value.
+    fn difference(&self, measure: Measure) -> f64 {
+        let mean = self.wrong / self.values;
+        if measure == Measure::Rmse { mean.max(0.0).sqrt() } else { mean }
+    }
+
+    /// What the picture should show on average: the parts alone say, or better the whole picture, and the parts what is wrong with it.
+    fn mean(&self, mean_shown: Option<f64>) -> f64 {
+        let mean = match mean_shown {
+            Some(mean) => mean + (self.truth - self.shown) / self.values,
+            None => self.truth / self.values,
+        };
+        mean.max(f64::MIN_POSITIVE)
+    }
+
+    fn error(&self, measure: Measure, mean_shown: Option<f64>) -> f64 {
+        let difference = self.difference(measure);
+        if difference == 0.0 { 0.0 } else { difference / self.mean(mean_shown) }
+    }
+}
+
+/// Two-sided quantile of the normal distribution.
+const CONFIDENT: f64 = 1.96;
+
+impl ErrorEstimate {
+    /// From some parts of a picture; `mean_shown` is the mean of the whole, if there is one yet. `None` without parts.
+    pub(super) fn of(
+        parts: &[PartError],
+        measure: Measure,
+        mean_shown: Option<f64>,
+        rays: u64,
+    ) -> Option<Self> {
+        if parts.len() < 2 {
+            return None;
+        }
+        let mut all = PartError::default();
+        parts.iter().for_each(|part| all.add(part));
+        // The jackknife: how much the estimate moves when any one part is left out.
+        let count = parts.len() as f64;
+        let others = parts.iter().map(|part| all.without(part).error(measure, mean_shown));
+        let middle = others.clone().sum::<f64>() / count;
+        let squares: f64 = others.map(|other| (other - middle).powi(2)).sum();
+        let deviation = (squares * (count - 1.0) / count).sqrt();
+        let worst = parts.iter().map(|part| part.difference(measure)).fold(0.0, f64::max);
+        Some(Self {
+            measure,
+            error: all.error(measure, mean_shown) as f32,
+            confidence: (CONFIDENT * deviation) as f32,
+            worst: (worst / all.mean(mean_shown)) as f32,
+            parts: parts.len() as u32,
+            pixels: (all.values / 3.0) as u64,
+            rays,
+        })
+    }
+
+    /// Whether the error is at most `limit`, with confidence.
+    pub(super) fn is_within(&self, limit: f32) -> bool {
+        self.error + self.confidence <= limit
+    }
+}
+
+impl fmt::Display for Accuracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Two digits where they say something, and what was asked for as it was written.
+        let percent = |share: f32| {
+            let percent = 100.0 * share;
+            if percent < 1.0 { format!("{percent:.2}") } else { format!("{percent:.1}") }
+        };
+        let asked = f64::from((1e6 * self.asked).round()) / 1e4;
+        match &self.found {
+            Some(found) => {
+                let ErrorEstimate { measure, error, confidence, worst, parts, pixels, .. } = *found;
+                let (error, confidence, worst) = (percent(error), percent(confidence), percent(worst));
+                let name = if measure == Measure::Rmse { "RMSE" } else { "of the light" };
+                let place = if u64::from(parts) == pixels { "pixels" } else { "blocks" };
+                write!(
+                    f,
+                    "error {error} % ± {confidence} ({name}; {parts} {place} held out, the worst {worst} %)"
+                )?;
+            }
+            None if self.ending == Ending::Exact => f.write_str("error 0: every shadow ray was traced")?,
+            None => f.write_str("error not measured")?,
+        }
+        match self.ending {
+            Ending::Error => write!(f, "; below {asked} % with 95 % confidence")?,
+            Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
+            Ending::Finest => {
+                write!(f, "; asked for {asked} %, but the light mesh is the finest that is tried")?
+            }
+            Ending::Time => write!(f, "; the time limit ended it, {asked} % were asked for")?,
+            Ending::Exact => {}
+        }
+        match self.rays_for_half {
+            Some(rays) if self.found.is_some() => {
+                write!(f, "; half of it would take about {:.1} million shadow rays", rays as f64 / 1e6)
+            }
+            _ => Ok(()),
+        }
+    }
+}

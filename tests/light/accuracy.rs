@@ -1,0 +1,181 @@
+//! How wrong a picture is, by what the renderer says of itself (method §14): against pictures that are made without a light mesh, it tells the truth.
+
+use std::time::Duration;
+
+use glam::Vec3;
+use lightmesh::image::Image;
+use lightmesh::image::metrics::{MetricsOptions, compare};
+use lightmesh::render::{Ending, Measure, RenderStats, StopToken, Tile, TileSink};
+use lightmesh::scene::load::LoadedScene;
+use lightmesh::settings::{Integrator, Leaks, Limits, Neighbourhood, Radius, Resolve, Settings, Spacing};
+use std::sync::Mutex;
+
+use crate::common::{bits, forest, picture, session, settings_at};
+
+fn scene() -> LoadedScene {
+    forest(3_000, 20)
+}
+
+/// Averaged shadows; the spacing is left open.
+fn settings(max_error: f32) -> Settings {
+    let mut settings = settings_at((64, 48));
+    settings.shading.integrator = Integrator::LightMesh;
+    settings.shading.kernel.leaks = Leaks::Allow;
+    settings.limits.max_error = Some(max_error);
+    settings
+}
+
+fn rendered(scene: &LoadedScene, settings: &Settings) -> (Image, RenderStats) {
+    picture(&scene.scene, &scene.cameras[0], settings)
+}
+
+/// What is wrong with a picture, by the integrator that needs no light mesh.
+fn true_error(scene: &LoadedScene, image: &Image, settings: &Settings) -> f32 {
+    let mut settings = settings.clone();
+    settings.shading.integrator = Integrator::Reference;
+    settings.shading.reference_samples = 256;
+    settings.limits = Limits::default();
+    let (reference, _) = rendered(scene, &settings);
+    let metrics = compare(image, &reference, MetricsOptions::default()).expect("one size");
+    metrics.relative_rmse.expect("the forest is lit") as f32
+}
+
+/// A mesh of another place, as dense, says how far a mesh is from the mean over D_y: at three spacings between R and R/3 the true error lies within
+/// twice the interval that is given, which is one of 95 % and rests on a tenth of the pixels.
+#[test]
+fn the_error_that_is_said_is_the_true_one() {
+    let scene = scene();
+    for spacing in [1.2, 0.8, 0.4] {
+        let mut settings = settings(1e-6);
+        settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+        settings.shading.kernel.radius = Radius::Units(1.2);
+        let (image, stats) = rendered(&scene, &settings);
+        let accuracy = stats.accuracy.expect("measured");
+        let found = accuracy.found.expect("per-light is measured");
+        let truth = true_error(&scene, &image, &settings);
+        assert!(
+            (found.error - truth).abs() <= 2.0 * found.confidence,
+            "spacing {spacing}: {truth} is the truth, found {found:?}"
+        );
+        assert!(found.confidence < 0.8 * found.error, "spacing {spacing}: {found:?} says nothing");
+        assert_eq!((accuracy.ending, found.measure), (Ending::Settings, Measure::Rmse));
+    }
+}
+
+/// Whoever asks for less error gets it, for more rays, with the same R: all pictures are of the same softness, that of a render without a limit.
+#[test]
+fn the_error_that_is_asked_for_is_kept() {
+    let scene = scene();
+    let mut before = 0;
+    for asked in [0.1, 0.05, 0.02] {
+        let settings = settings(asked);
+        let (image, stats) = rendered(&scene, &settings);
+        let accuracy = stats.accuracy.expect("measured");
+        let found = accuracy.found.expect("per-light is measured");
+        assert_eq!(accuracy.ending, Ending::Error);
+        assert!(found.error + found.confidence <= 1.2 * asked, "{found:?}");
+        let truth = true_error(&scene, &image, &settings);
+        assert!(truth <= 1.2 * asked, "asked for {asked}, truth is {truth}");
+        assert!(stats.rays.shadow > before, "{asked}: {} rays", stats.rays.shadow);
+        before = stats.rays.shadow;
+    }
+}
+
+/// What is tried is part of the mesh: a second render knows it all, and is the same to the bit. So is one that knew nothing, on other blocks.
+#[test]
+fn a_chosen_mesh_is_kept_and_depends_on_nothing_else() {
+    let scene = scene();
+    let settings = settings(0.05);
+    let mut session = session(&scene.scene);
+    let (first, _) = session.render(&scene.cameras[0], &settings).expect("an image");
+    let (second, stats) = session.render(&scene.cameras[0], &settings).expect("an image");
+    assert_eq!((stats.rays.shadow, stats.mesh_points.direct.evaluated), (0, 0));
+    let mut blocks = settings;
+    blocks.view.block_samples = Some(1);
+    let (other, _) = rendered(&scene, &blocks);
+    assert!(bits(&first) == bits(&second) && bits(&first) == bits(&other));
+}
+
+/// Traced shadows that take everything on trust are wrong; that is found, and they are made again until they are as good as asked for.
+#[test]
+fn traced_shadows_that_are_wrong_are_made_again() {
+    let scene = scene();
+    let mut settings = settings(0.0);
+    settings.shading.integrator = Integrator::LightMesh;
+    settings.shading.resolve = Resolve::Trace;
+    settings.shading.tolerance = 100.0;
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(1.5));
+    let (careless, _) = rendered(&scene, &settings);
+    let mut exact = settings.clone();
+    exact.shading.integrator = Integrator::Conventional;
+    let (exact, _) = rendered(&scene, &exact);
+    let wrong = |image: &Image| {
+        let pairs = || image.pixels().iter().flatten().zip(exact.pixels().iter().flatten());
+        pairs().map(|(a, b)| (a - b).abs()).sum::<f32>() / pairs().map(|(_, b)| b).sum::<f32>()
+    };
+    settings.limits.max_error = Some(0.02);
+    assert!(wrong(&careless) > 0.04, "the test shows nothing: {}", wrong(&careless));
+
+    settings.shading.integrator = Integrator::Auto;
+    let (image, stats) = rendered(&scene, &settings);
+    let accuracy = stats.accuracy.expect("measured");
+    assert!(matches!(accuracy.ending, Ending::Error | Ending::Exact), "{accuracy:?}");
+    assert!(wrong(&image) <= 1.2 * 0.02, "{}: {accuracy:?}", wrong(&image));
+}
+
+/// Conventional shadows have no error to be measured.
+#[test]
+fn what_is_traced_in_full_is_exact() {
+    let mut settings = settings(0.05);
+    settings.shading.integrator = Integrator::Conventional;
+    let accuracy = rendered(&scene(), &settings).1.accuracy.expect("asked for");
+    assert_eq!((accuracy.ending, accuracy.found), (Ending::Exact, None));
+}
+
+/// Counts whole pictures and their tiles' pixels.
+#[derive(Default)]
+struct Watch(Mutex<(Vec<Vec<u32>>, usize)>);
+
+impl TileSink for Watch {
+    fn tile(&self, _: &Tile, pixels: &[[f32; 3]]) {
+        self.0.lock().unwrap().1 += pixels.len();
+    }
+
+    fn picture(&self, image: &Image) {
+        self.0.lock().unwrap().0.push(bits(image));
+    }
+}
+
+/// Steps are whole pictures, the last one is that of a render in one step.
+#[test]
+fn steps_end_with_the_picture_of_one_step() {
+    let scene = scene();
+    let mut settings = settings(0.05);
+    let (alone, _) = rendered(&scene, &settings);
+    settings.limits.steps = 3;
+    let watch = Watch::default();
+    let mut session = session(&scene.scene);
+    let (image, stats) =
+        session.render_to(&scene.cameras[0], &settings, &watch, &StopToken::default()).expect("an image");
+    let (pictures, pixels) = watch.0.into_inner().unwrap();
+    assert_eq!((pictures.len(), pixels), (3, 3 * 64 * 48));
+    assert!(pictures[2] == bits(&image) && bits(&image) == bits(&alone));
+    assert!(pictures[0] != pictures[1] && pictures[1] != pictures[2]);
+    assert_eq!(stats.rays.camera, 3 * 64 * 48);
+}
+
+/// Who has no time gets the first picture, whole, and is told so.
+#[test]
+fn time_ends_a_render_with_a_whole_picture() {
+    let scene = scene();
+    let mut settings = settings(0.02);
+    settings.limits.time = Some(Duration::from_nanos(1));
+    let (image, stats) = rendered(&scene, &settings);
+    let accuracy = stats.accuracy.expect("asked for");
+    assert_eq!((accuracy.ending, accuracy.found), (Ending::Time, None));
+    settings.limits = Limits { max_error: None, time: None, steps: 1 };
+    settings.shading.kernel.neighbourhood = Neighbourhood::Nearest;
+    let (fine, _) = rendered(&scene, &settings);
+    let ratio = |image: &Image| image.pixels().iter().flatten().sum::<f32>();
+    assert!((ratio(&image) / ratio(&fine) - 1.0).abs() < 0.2, "a rough picture of the same scene");
+}
