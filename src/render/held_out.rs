@@ -1,4 +1,4 @@
-//! Parts of a picture that are held out: computed without a light mesh, they tell what is wrong with the rest (method §14).
+//! Parts of a picture that are held out: computed without a light mesh, they tell what is wrong with the rest (method §10).
 
 use std::collections::HashSet;
 use std::ops::Range;

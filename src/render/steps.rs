@@ -1,5 +1,5 @@
 //! From settings that leave things open to a picture: whole pictures one after the other, each better than the one before, until one is good
-//! enough or the time is over (method §14).
+//! enough or the time is over (method §10).
 
 use std::time::Instant;
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// What a render may cost, and how wrong its picture may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// The error that direct light may have, as a share of the picture's mean brightness (method §14); 0 takes the other settings as
+    /// The error that direct light may have, as a share of the picture's mean brightness (method §10); 0 takes the other settings as
     /// they are and measures nothing, `None` leaves it to the program: nothing is measured.
     pub max_error: Option<f32>,
     /// Time after which no further step is taken and the last one ends, with the best whole picture so far.

@@ -1,4 +1,4 @@
-//! How wrong a picture is, by what the renderer says of itself (method §14): against pictures that are made without a light mesh, it tells the truth.
+//! How wrong a picture is, by what the renderer says of itself (method §10): against pictures that are made without a light mesh, it tells the truth.
 
 use std::time::Duration;
 
