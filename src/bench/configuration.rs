@@ -50,6 +50,7 @@ impl Configuration {
                 layout: self.layout.clone(),
                 spacing: Spacing::Units(Vec3::splat(self.spacing)),
                 regions: Vec::new(),
+                levels: 0,
             },
             indirect: None,
         };

@@ -5,7 +5,8 @@ use clap::Args;
 use super::choice::named;
 use super::parse::{self, Bounces, TimeLimit};
 use crate::settings::{
-    Estimator, Integrator, Limits, Neighbourhood, PixelFilter, Radius, Resolve, Settings, Spacing,
+    Estimator, Integrator, Limits, Neighbourhood, PixelFilter, PointSettings, Radius, Resolve, Settings,
+    Spacing,
 };
 
 /// Settings of the scene file that flags can override.
@@ -36,6 +37,9 @@ pub struct Overrides {
     /// Distance between mesh points: one number, X,Y,Z, or auto
     #[arg(long, value_name = "S", value_parser = parse::spacing)]
     spacing: Option<Spacing>,
+    /// Coarser mesh points, of twice the spacing each, whose agreement spares finer ones their rays
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(PointSettings::MOST_LEVELS)))]
+    levels: Option<u32>,
     /// Times that light passes between surfaces, or off
     #[arg(long, value_name = "BOUNCES", value_parser = parse::bounces)]
     indirect: Option<Bounces>,
@@ -96,6 +100,7 @@ impl Overrides {
         set(&mut shading.kernel.neighbourhood, self.neighbourhood);
         set(&mut shading.kernel.radius, self.radius);
         set(&mut mesh.direct.spacing, self.spacing);
+        set(&mut mesh.direct.levels, self.levels);
         set(&mut view.resolution, self.resolution);
         set(&mut view.samples_per_pixel, self.spp);
         set(&mut view.filter, self.filter);

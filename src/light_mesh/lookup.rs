@@ -297,6 +297,7 @@ mod tests {
                     layout: layout.clone(),
                     spacing: Spacing::Units(Vec3::new(0.4, 0.3, 0.35)),
                     regions: vec![fine],
+                    levels: 0,
                 };
                 let kernel = KernelSettings {
                     radius: Radius::Spacings(1.4),

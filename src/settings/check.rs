@@ -91,6 +91,8 @@ impl PointSettings {
             let holds = !positions.is_empty() && positions.iter().all(|position| position.is_finite());
             check("points.layout", "list at least one position, all finite", positions.len(), holds)?;
         }
+        let levels = self.levels;
+        check("points.levels", "lie in 0 to 4", levels, levels <= Self::MOST_LEVELS)?;
         for region in &self.regions {
             let spacing = region.spacing.is_none_or(|spacing| spacing.to_array().into_iter().all(is_length));
             let holds = spacing && region.radius.is_none_or(is_length) && !region.bounds.is_empty();
@@ -129,6 +131,7 @@ mod tests {
             refused(&|s| s.mesh.direct.layout = PointLayout::List(Vec::new().into())),
             "points.layout"
         );
+        assert_eq!(refused(&|s| s.mesh.direct.levels = 5), "points.levels");
         let indirect =
             |change: fn(&mut IndirectSettings)| refused(&|s| s.mesh.indirect.iter_mut().for_each(change));
         assert_eq!(indirect(|i| i.directions = 0), "mesh.indirect.directions");

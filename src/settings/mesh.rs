@@ -26,11 +26,19 @@ pub struct PointSettings {
     pub spacing: Spacing,
     /// Boxes with a spacing and radius of their own; where they overlap, the last one holds.
     pub regions: Vec<Region>,
+    /// How often the spacing is doubled to get to the points from which all lights are traced; points between them trace those alone on which the
+    /// coarser ones around them disagree (method §8). 0 to [`PointSettings::MOST_LEVELS`].
+    pub levels: u32,
+}
+
+impl PointSettings {
+    /// More levels would begin with points that know nothing of each other's surroundings.
+    pub const MOST_LEVELS: u32 = 4;
 }
 
 impl Default for PointSettings {
     fn default() -> Self {
-        Self { layout: PointLayout::Regular, spacing: Spacing::Auto, regions: Vec::new() }
+        Self { layout: PointLayout::Regular, spacing: Spacing::Auto, regions: Vec::new(), levels: 0 }
     }
 }
 
@@ -61,7 +69,8 @@ impl IndirectSettings {
 
     /// Points for indirect light, given those for direct light.
     pub fn coarser_points(points: &PointSettings) -> PointSettings {
-        let mut points = points.clone();
+        // What a point gathers has no bits on which neighbours could agree.
+        let mut points = PointSettings { levels: 0, ..points.clone() };
         let spacing = |spacing: Vec3| spacing * Self::COARSENESS;
         if let Spacing::Units(units) = points.spacing {
             points.spacing = Spacing::Units(spacing(units));

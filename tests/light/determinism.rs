@@ -44,6 +44,7 @@ fn variants() -> Vec<(&'static str, Settings)> {
         variant("directional", &|s| s.shading.estimator = Estimator::Directional),
         variant("invalidated points", &|s| s.shading.kernel.leaks = Leaks::Invalidate),
         variant("blue noise", &|s| s.mesh.direct.layout = PointLayout::BlueNoise { seed: 3 }),
+        variant("levels", &|s| s.mesh.direct.levels = 2),
         variant("hybrid", &|s| s.shading.resolve = Resolve::Trace),
         variant("hybrid, emitters", &|s| (s.shading.resolve, s.shading.lambertian) = (Resolve::Trace, true)),
         variant("one bounce", &|s| s.mesh.indirect = indirect()),

@@ -14,6 +14,7 @@ mod hybrid;
 mod lamps;
 mod lazy;
 mod leaks;
+mod levels;
 mod moving;
 mod penumbra;
 mod physical;

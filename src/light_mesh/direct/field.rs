@@ -15,7 +15,7 @@ use crate::simd::LANES;
 /// ray. Those are caches, filled for the estimators that read them and emptied when the lights' intensities change.
 #[derive(Default)]
 pub struct DirectField {
-    bits: Vec<VisibilityBits>,
+    pub(super) bits: Vec<VisibilityBits>,
     light: DerivedValues,
     irradiance: DerivedValues,
 }

@@ -87,10 +87,8 @@ impl DirectMesh {
         interpolation: &DirectInterpolation,
         needed: &PointMask,
     ) -> DirectEvaluation {
+        let (evaluated, shadow) = self.trace(world, needed);
         let Self { store, field } = self;
-        let new = store.allocate(needed);
-        let evaluated = new.len() as u64;
-        let shadow = field.trace(world.accel, world.lights, new);
         field.derive(world.lights, Basis::of(interpolation.estimator), store.positions());
         let inside = if interpolation.leaks == Leaks::Invalidate {
             store.find_inside(world.accel, world.scene, usize::MAX)
@@ -98,6 +96,24 @@ impl DirectMesh {
             0
         };
         DirectEvaluation { evaluated, shadow, inside }
+    }
+
+    /// Finds the visibility of the unknown ones of the needed points, coarser points first; returns the number of points and rays.
+    fn trace<A: Accel>(&mut self, world: World<A>, needed: &PointMask) -> (u64, u64) {
+        let corners = self.store.corners_of(needed);
+        let coarser = if corners.len() > 0 { self.trace(world, &corners) } else { (0, 0) };
+        let Self { store, field } = self;
+        let new = store.allocate(needed);
+        let points = store.positions();
+        let points = &points[points.len() - new.len()..];
+        // The layers of one interpolation have as many levels each, so that either all new points build on others, or none.
+        let corners: Vec<[u32; 8]> = new.iter().filter_map(|&id| store.corner_slots(id)).collect();
+        let rays = if !new.is_empty() && corners.len() == new.len() {
+            field.refine(world.accel, world.lights, points, &corners)
+        } else {
+            field.trace(world.accel, world.lights, points)
+        };
+        (coarser.0 + new.len() as u64, coarser.1 + rays)
     }
 
     /// The mesh as surface points interpolate it.

@@ -5,6 +5,7 @@ mod derived;
 mod estimators;
 mod field;
 mod mesh;
+mod refine;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod spherical_harmonics;

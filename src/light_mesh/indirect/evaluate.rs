@@ -48,7 +48,8 @@ impl IndirectMesh {
         let leaks = interpolation.shading.kernel.leaks;
         loop {
             let known = self.store.positions().len();
-            let new = self.store.allocate(&needed).to_vec();
+            self.store.allocate(&needed);
+            let new = self.store.positions()[known..].to_vec();
             if new.is_empty() {
                 break;
             }

@@ -58,6 +58,16 @@ impl Lattice {
         (cell == last && self.at(cell) == position).then(|| self.id(cell))
     }
 
+    /// The corners of the cell that holds a position.
+    pub fn corners(&self, position: Vec3) -> [u64; 8] {
+        let place = ((position - self.origin) * self.inverse_spacing).floor();
+        let (cell, _) = within_range(place, place);
+        std::array::from_fn(|corner| {
+            let corner = corner as i32;
+            self.id(cell + IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2))
+        })
+    }
+
     /// Number of points in a box.
     pub fn count_in(&self, bounds: Bounds) -> u64 {
         let first = ((bounds.min - self.origin) * self.inverse_spacing).ceil();

@@ -80,7 +80,7 @@ impl Neighbourhoods {
             Radius::Spacings(factor) => factor * spacing.max_element(),
         };
         let mut zone = |region: Option<Bounds>, spacing: Vec3, radius: f32| {
-            let layer = points.layer(&settings.layout, spacing)?;
+            let layer = points.layer(&settings.layout, spacing, settings.levels)?;
             Ok(Zone::new(bounds, region, kernel.neighbourhood, layer, spacing.max_element(), radius))
         };
         let mut zones = vec![zone(None, spacing, radius_for(spacing))?];

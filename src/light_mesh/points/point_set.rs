@@ -47,6 +47,9 @@ struct Layer {
     positions: Positions,
     /// Id of its first point.
     first_id: u64,
+    /// Coarser layers that its points build on, one on the other, and the first of them.
+    levels: u32,
+    parent: Option<usize>,
 }
 
 /// Mesh points of one or several layouts and spacings, their *layers*, over a scene.
@@ -68,17 +71,30 @@ impl PointSet {
         self.bounds
     }
 
-    /// Number of the layer of a layout and spacing; it is added if there is none.
+    /// Number of the layer of a layout and spacing whose points build on those of so many `levels` of twice the spacing each; it is added if there
+    /// is none.
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub(super) fn layer(&mut self, layout: &PointLayout, spacing: Vec3) -> Result<usize, MeshError> {
+    pub(super) fn layer(
+        &mut self,
+        layout: &PointLayout,
+        spacing: Vec3,
+        levels: u32,
+    ) -> Result<usize, MeshError> {
         // A list has no spacing.
         let is_list = matches!(layout, PointLayout::List(_));
-        let same = |layer: &Layer| layer.layout == *layout && (is_list || layer.spacing == spacing);
+        let levels = if is_list { 0 } else { levels };
+        let same = |layer: &Layer| {
+            layer.layout == *layout && layer.levels == levels && (is_list || layer.spacing == spacing)
+        };
         if let Some(known) = self.layers.iter().position(same) {
             return Ok(known);
         }
+        let parent = match levels.checked_sub(1) {
+            Some(below) => Some(self.layer(&PointLayout::Regular, spacing * 2.0, below)?),
+            None => None,
+        };
         let number = self.layers.len();
         if number == MOST_LAYERS {
             return Err(MeshError::TooManySpacings);
@@ -94,7 +110,7 @@ impl PointSet {
             PointLayout::BlueNoise { seed } => periodic(PeriodicLayout::BlueNoise, *seed),
         };
         let first_id = (number as u64) << LAYER_SHIFT;
-        self.layers.push(Layer { layout: layout.clone(), spacing, positions, first_id });
+        self.layers.push(Layer { layout: layout.clone(), spacing, positions, first_id, parent, levels });
         Ok(number)
     }
 
@@ -104,15 +120,34 @@ impl PointSet {
         with_positions!(layer, positions => positions.position(id - layer.first_id))
     }
 
-    /// Points of other layers at exactly the position of a point.
+    /// Whether points of a layer take the values of points of another one: those of coarser layers that they build on, and otherwise layers in which
+    /// all lights are traced share among themselves, so that no value depends on what was rendered before.
+    fn may_take(&self, own: usize, other: usize) -> bool {
+        let parent = |number: usize| self.layers[number].parent;
+        let coarser = || std::iter::successors(parent(own), |number| parent(*number));
+        match parent(own) {
+            None => other != own && parent(other).is_none(),
+            Some(_) => coarser().any(|number| number == other),
+        }
+    }
+
+    /// Points of other layers at exactly the position of a point, whose values are its own.
     pub(crate) fn twins(&self, id: u64) -> impl Iterator<Item = u64> + '_ {
         let own = (id >> LAYER_SHIFT) as usize;
         let position = (self.layers.len() > 1).then(|| self.position(id));
-        let others = self.layers.iter().enumerate().filter(move |(number, _)| *number != own);
+        let others = self.layers.iter().enumerate().filter(move |(number, _)| self.may_take(own, *number));
         others.filter_map(move |(_, layer)| {
             let twin = with_positions!(layer, positions => positions.id_at(position?));
             twin.map(|id| layer.first_id + id)
         })
+    }
+
+    /// The eight coarser points around a point that it builds on; `None` where every light is traced.
+    pub(crate) fn corners(&self, id: u64) -> Option<[u64; 8]> {
+        let own = &self.layers[(id >> LAYER_SHIFT) as usize];
+        let parent = &self.layers[own.parent?];
+        let Positions::Lattice(lattice) = &parent.positions else { return None };
+        Some(lattice.corners(self.position(id)).map(|corner| parent.first_id + corner))
     }
 
     /// About how many points of a layer lie in a box.
@@ -162,12 +197,12 @@ mod tests {
     fn layers_are_kept() {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::splat(8.0) };
         let mut points = PointSet::new(bounds);
-        let coarse = points.layer(&PointLayout::Regular, Vec3::ONE).unwrap();
-        let fine = points.layer(&PointLayout::Regular, Vec3::splat(0.5)).unwrap();
+        let coarse = points.layer(&PointLayout::Regular, Vec3::ONE, 0).unwrap();
+        let fine = points.layer(&PointLayout::Regular, Vec3::splat(0.5), 0).unwrap();
         assert_ne!(coarse, fine);
-        assert_eq!(points.layer(&PointLayout::Regular, Vec3::ONE), Ok(coarse));
+        assert_eq!(points.layer(&PointLayout::Regular, Vec3::ONE, 0), Ok(coarse));
         let jittered = PointLayout::Jittered { seed: 1 };
-        assert_ne!(points.layer(&jittered, Vec3::ONE), Ok(coarse));
+        assert_ne!(points.layer(&jittered, Vec3::ONE, 0), Ok(coarse));
         // Every coarse point has a fine twin, and that one leads back.
         points.for_each_in_box(coarse, bounds.min, bounds.max, |id, position| {
             let twin = points.twins(id).find(|&twin| points.twins(twin).any(|back| back == id));

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::point_mask::PointMask;
+use super::point_mask::{NeededPoints, PointMask};
 use super::slots::SlotTable;
 use crate::accel::Accel;
 use crate::light_mesh::leaks::{PROBES, is_inside};
@@ -28,16 +28,32 @@ impl PointStore {
         Self { points, slots: SlotTable::default(), positions: Vec::new(), inside: Vec::new() }
     }
 
-    /// Makes the needed points known; returns the positions of those that were not, in slot order.
-    pub(crate) fn allocate(&mut self, needed: &PointMask) -> &[Vec3] {
+    /// Makes the needed points known; returns the ids of those that were not, in slot order: their slots are the last ones.
+    pub(crate) fn allocate(&mut self, needed: &PointMask) -> Vec<u64> {
         let Self { points, slots, positions, .. } = self;
         let known = |slots: &SlotTable, id: u64| {
             points.twins(id).map(|twin| slots.slot(twin)).find(|slot| *slot != UNKNOWN)
         };
         let new = slots.allocate(needed, known);
-        let first = positions.len();
-        positions.extend(new.into_iter().map(|id| points.position(id)));
-        &positions[first..]
+        positions.extend(new.iter().map(|&id| points.position(id)));
+        new
+    }
+
+    /// The coarser points that the unknown ones among some points build on.
+    pub(crate) fn corners_of(&self, needed: &PointMask) -> PointMask {
+        let mut corners = NeededPoints::default();
+        for (brick, mask) in needed.bricks() {
+            let ids = (0..64).filter(|place| mask >> place & 1 == 1).map(|place| brick * 64 + place);
+            for id in ids.filter(|&id| self.slot(id) == UNKNOWN) {
+                self.points.corners(id).into_iter().flatten().for_each(|corner| corners.insert(corner));
+            }
+        }
+        PointMask::union(corners.into_bricks())
+    }
+
+    /// Slots of the coarser points that a point builds on, which must be known.
+    pub(crate) fn corner_slots(&self, id: u64) -> Option<[u32; 8]> {
+        self.points.corners(id).map(|corners| corners.map(|corner| self.slot(corner)))
     }
 
     /// Slot of a point; `u32::MAX` where it is not known.

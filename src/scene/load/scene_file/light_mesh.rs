@@ -10,7 +10,8 @@ use super::points::{self, PointKeys};
 use super::values::{Count, NonNegative};
 use crate::scene::load::LoadError;
 use crate::settings::{
-    Estimator, IndirectForm, IndirectSettings, IndirectShading, Normalization, Resolve, Settings,
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, Normalization, PointSettings, Resolve,
+    Settings,
 };
 
 points::point_table! {
@@ -20,6 +21,7 @@ points::point_table! {
         estimator: Option<Estimator>,
         resolve: Option<Resolve>,
         tolerance: Option<NonNegative>,
+        levels: Option<Count<{ PointSettings::MOST_LEVELS }, 0>>,
         indirect: Option<IndirectTable>,
     }
 }
@@ -43,6 +45,7 @@ impl LightMeshTable {
     pub fn apply(&self, settings: &mut Settings, folder: &Path, places: &Places) -> Result<(), LoadError> {
         let Settings { mesh, shading, .. } = settings;
         self.point_keys("light_mesh").apply(&mut mesh.direct, &mut shading.kernel, folder, places)?;
+        mesh.direct.levels = self.levels.map_or(mesh.direct.levels, |count| count.0);
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
         shading.resolve = self.resolve.unwrap_or(shading.resolve);
         shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);
