@@ -1,8 +1,8 @@
 //! How a scene is rendered: every choice that is not part of the scene itself.
 //!
-//! Settings fall into four parts, by what a change of them costs: what a view is, what identifies the values of mesh points (a
-//! change there means other points), how surface points are shaded from them (a change there keeps all known values), and how
-//! files are written.
+//! Settings fall into five parts, by what a change of them costs: what a view is, what identifies the values of mesh points (a
+//! change there means other points), how surface points are shaded from them (a change there keeps all known values), how
+//! files are written, and when a picture is good enough.
 
 mod check;
 mod limits;

@@ -1,0 +1,124 @@
+//! One picture, by settings that leave nothing open.
+
+use super::choice::choose;
+use super::error::RenderError;
+use super::film::TileSink;
+use super::frame::{Frame, StopToken};
+use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
+use super::meshes::{LightMeshes, MeshInterpolation};
+use super::need::needed_points;
+use super::stats::{RenderStats, timed};
+use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
+use crate::accel::Accel;
+use crate::image::Image;
+use crate::light_mesh::store::PointMask;
+use crate::scene::Camera;
+use crate::settings::{Integrator, Settings};
+use crate::world::World;
+
+/// A view of a world, and who receives its pictures.
+pub(super) struct View<'a, A> {
+    pub world: World<'a, A>,
+    pub camera: &'a Camera,
+    pub sink: &'a dyn TileSink,
+    pub stop: &'a StopToken,
+}
+
+impl<A: Accel> View<'_, A> {
+    /// The view, cut up.
+    pub(super) fn frame<'a>(&'a self, settings: &'a Settings) -> Frame<'a, A> {
+        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop)
+    }
+
+    pub(super) fn render_fixed(
+        &self,
+        settings: &Settings,
+        meshes: &mut LightMeshes,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        render_frame(self.frame(settings), self.camera, settings, meshes)
+    }
+}
+
+/// Renders with the integrator that the settings name.
+fn render_frame<A: Accel>(
+    mut frame: Frame<A>,
+    camera: &Camera,
+    settings: &Settings,
+    meshes: &mut LightMeshes,
+) -> Result<(Image, RenderStats), RenderError> {
+    let mut stats = RenderStats::default();
+    let world = frame.world;
+    meshes.renew_lights(world.lights);
+    let integrator = match settings.shading.integrator {
+        Integrator::Auto => {
+            let choice = choose(&frame, camera, settings, meshes, &mut stats)?;
+            stats.choice = Some(choice);
+            choice.integrator
+        }
+        named => named,
+    };
+    stats.integrator = Some(integrator);
+    let by_light_mesh = matches!(integrator, Integrator::LightMesh | Integrator::Auto);
+    let interpolation = if by_light_mesh {
+        let interpolation = meshes.interpolation(world.scene, camera, settings)?;
+        evaluate_indirect(&mut frame, meshes, &interpolation, &mut stats)?;
+        Some(interpolation)
+    } else {
+        meshes.renew_indirect(world.scene, settings)?;
+        None
+    };
+    if let Some(mesh) = &mut meshes.surface {
+        evaluate_surface_light(&mut frame, mesh, camera, settings, &mut stats)?;
+    }
+    let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
+    let image = match (integrator, interpolation) {
+        (Integrator::Reference, _) => {
+            let direct = ReferenceIntegrator::new(world, settings)?;
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
+        }
+        (_, Some(interpolation)) => {
+            let (direct, indirect) = (&mut meshes.direct, meshes.indirect.as_ref());
+            let direct = LightMeshIntegrator { world, direct, indirect, interpolation: &interpolation };
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
+        }
+        (_, None) => {
+            let scale = settings.shading.direct_scale();
+            let direct = ConventionalIntegrator { world, scale, indirect: None };
+            frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
+        }
+    };
+    if by_light_mesh || meshes.surface.is_some() {
+        stats.light_mesh_bytes = meshes.memory_bytes() as u64;
+    }
+    Ok((image, stats))
+}
+
+/// Evaluates what the view of a frame needs of a mesh of indirect light in free space.
+fn evaluate_indirect<A: Accel>(
+    frame: &mut Frame<A>,
+    meshes: &mut LightMeshes,
+    interpolation: &MeshInterpolation,
+    stats: &mut RenderStats,
+) -> Result<(), RenderError> {
+    let world = frame.world;
+    let counters = &mut stats.mesh_points;
+    counters.direct.total = interpolation.direct.neighbourhoods.count(&meshes.direct.store().points);
+    let (Some(mesh), Some(view)) = (&mut meshes.indirect, &interpolation.indirect) else { return Ok(()) };
+    counters.indirect.total = view.neighbourhoods.count(&mesh.store().points);
+    // Light that passes between surfaces several times is solved for at once, so that blocks leave no trace.
+    let mut needed = Vec::new();
+    frame.trace_image(stats, |paths, stats| {
+        timed(&mut stats.seconds.mesh, || {
+            needed.extend(needed_points(paths, mesh.view(view).lookup).bricks());
+        });
+    })?;
+    let mut seconds = stats.seconds.mesh;
+    timed(&mut seconds, || {
+        let needed = PointMask::union(needed);
+        stats.mesh_points.indirect.needed += needed.len();
+        let transport = interpolation.transport();
+        stats.add_indirect(mesh.evaluate(world, &mut meshes.direct, transport, view, needed));
+    });
+    stats.seconds.mesh = seconds;
+    Ok(())
+}

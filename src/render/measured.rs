@@ -1,0 +1,312 @@
+//! Pictures as good as they were asked for: what is wrong is measured at parts that are held out (method §10).
+
+use glam::Vec3;
+
+use super::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
+use super::error::RenderError;
+use super::fixed::View;
+use super::held_out::{HeldOut, Pixels, part_errors};
+use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
+use super::meshes::{LightMeshes, MeshInterpolation};
+use super::need::needed_points;
+use super::stats::{RenderStats, timed};
+use super::surface_light::{SurfaceLight, WithSurfaceLight};
+use crate::accel::Accel;
+use crate::image::Image;
+use crate::settings::{
+    Estimator, IndirectForm, Integrator, Neighbourhood, PointLayout, Radius, Resolve, Settings, Spacing,
+};
+
+/// Where the points of the other mesh lie, in spacings: far from all points of a regular mesh and from the centres of its cells.
+const SHIFT: Vec3 = Vec3::new(0.27, 0.72, 0.23);
+
+/// Rays that measuring the error may take where shadows are averaged, as a share of the camera rays, since those of the mesh aren't known yet, and
+/// what is always spent, with which a frame of a tenth of a second says something about itself: they cost four times as much as camera rays.
+const MEASURED_BY_CAMERA: f64 = 0.02;
+const FEWEST_RAYS: f64 = 5e4;
+
+/// The same where shadows are traced, as a share of all rays.
+const MEASURED: f64 = 0.08;
+
+/// Parts that are held out at least, and at most: pixels where shadows are soft, and blocks where they are traced, whose pixels share
+/// what is found at edges of shadows.
+const PIXELS: (usize, usize) = (64, 2048);
+const BLOCKS: (usize, usize) = (32, 1024);
+const BLOCK: u32 = 8;
+/// Blocks that are shaded before the rays are counted.
+const BATCH: usize = 16;
+
+/// Spacings that are tried are R times powers of 2, this many to an octave, down to R/8: beyond, conventional tracing costs less.
+const STEPS_PER_OCTAVE: f32 = 3.0;
+const FINEST: u32 = 9;
+
+/// The error falls with about this power of the spacing, by what `lightmesh bench` finds on the forest; the first guess leaves some room for the
+/// uncertainty of what is measured.
+const ORDER: f32 = 1.9;
+const HEADROOM: f32 = 1.25;
+
+/// Mesh points by which the error is halved: 2^(3/[`ORDER`]).
+const POINTS_FOR_HALF: u64 = 3;
+
+/// What the tolerance of hybrid shadows is multiplied by, and how often, before all rays are traced.
+const STRICTER: f32 = 0.25;
+const STRICTER_TIMES: u32 = 2;
+
+impl<A: Accel> View<'_, A> {
+    /// Renders with an error of at most `asked`, if it is above 0 and can be measured.
+    pub(super) fn render_measured(
+        &self,
+        settings: &Settings,
+        asked: f32,
+        meshes: &mut LightMeshes,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        let shading = &settings.shading;
+        let is_linear = matches!(shading.estimator, Estimator::PerLight | Estimator::Directional);
+        let is_mesh = matches!(shading.integrator, Integrator::Auto | Integrator::LightMesh);
+        if asked <= 0.0 || self.world.lights.is_empty() || !is_linear || !is_mesh {
+            let (image, mut stats) = self.render_fixed(settings, meshes)?;
+            if asked > 0.0 {
+                let exact = shading.integrator == Integrator::Conventional || self.world.lights.is_empty();
+                let ending = if exact { Ending::Exact } else { Ending::Settings };
+                stats.accuracy = Some(Accuracy { asked, found: None, ending, rays_for_half: None });
+            }
+            return Ok((image, stats));
+        }
+        if shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight {
+            self.render_traced(settings.clone(), asked, meshes)
+        } else {
+            self.render_averaged(settings.clone(), asked, meshes)
+        }
+    }
+
+    /// Averaged shadows: the coarsest mesh that is good enough at pixels that are held out makes the picture.
+    fn render_averaged(
+        &self,
+        mut settings: Settings,
+        asked: f32,
+        meshes: &mut LightMeshes,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        let mut trial = RenderStats::default();
+        let mut seconds = 0.0;
+        let (errors, ending) = timed(&mut seconds, || {
+            let mut held_out = HeldOut::new(&self.frame(&settings), 1, PIXELS.1);
+            self.choose_points(&mut settings, asked, &mut held_out, meshes, &mut trial)
+        })?;
+        let (image, mut stats) = self.render_fixed(&settings, meshes)?;
+        stats.rays.add(&trial.rays);
+        stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
+        stats.seconds.check += seconds;
+        let found = errors.estimate(Some(mean(&image)));
+        let rays_for_half = Some(POINTS_FOR_HALF * stats.rays.shadow);
+        stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
+        Ok((image, stats))
+    }
+
+    /// Puts the coarsest points into the settings whose error at the held-out pixels is within the limit, if their spacing is left open. What
+    /// is evaluated for that is part of the mesh: finer points contain the coarser ones.
+    fn choose_points(
+        &self,
+        settings: &mut Settings,
+        asked: f32,
+        held_out: &mut HeldOut,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<(Errors, Ending), RenderError> {
+        let points = &settings.mesh.direct;
+        let by_direct = |form| form == IndirectForm::Scalar;
+        let is_open = points.spacing == Spacing::Auto
+            && points.layout == PointLayout::Regular
+            && points.regions.is_empty()
+            && settings.shading.kernel.neighbourhood != Neighbourhood::Nearest
+            && !settings.mesh.indirect.as_ref().is_some_and(|indirect| by_direct(indirect.form));
+        if !is_open {
+            let errors = self.errors_of(settings, held_out, meshes, stats)?;
+            let within = errors.estimate(None).is_none_or(|estimate| estimate.is_within(asked));
+            let ending = if within { Ending::Error } else { Ending::Settings };
+            return Ok((errors, ending));
+        }
+        let radius =
+            meshes.interpolation(self.world.scene, self.camera, settings)?.direct.neighbourhoods.radius();
+        settings.shading.kernel.radius = Radius::Units(radius);
+        let mut errors = Errors::default();
+        let mut step = 0;
+        while step <= FINEST {
+            let finer = Spacing::Units(Vec3::splat(radius * (-(step as f32) / STEPS_PER_OCTAVE).exp2()));
+            let before = std::mem::replace(&mut settings.mesh.direct.spacing, finer);
+            match self.errors_of(settings, held_out, meshes, stats) {
+                Ok(found) => errors = Errors { rays: errors.rays + found.rays, ..found },
+                Err(RenderError::Mesh(_)) if step > 0 => {
+                    settings.mesh.direct.spacing = before;
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+            let Some(estimate) = errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) else {
+                return Ok((errors, Ending::Error));
+            };
+            // As fine as it probably has to be, so that few meshes are tried.
+            let octaves = (HEADROOM * estimate.error / asked).log2() / ORDER;
+            step += ((octaves * STEPS_PER_OCTAVE).round() as u32).max(1);
+        }
+        Ok((errors, Ending::Finest))
+    }
+
+    /// What is wrong with direct light at the held-out pixels.
+    ///
+    /// They are compared with what another mesh of the same density gives, whose points lie elsewhere. Both miss the mean over D_y by as much,
+    /// independently of each other, so that the mean of the squared difference is twice that of the error.
+    fn errors_of(
+        &self,
+        settings: &Settings,
+        held_out: &mut HeldOut,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<Errors, RenderError> {
+        let world = self.world;
+        let interpolation = meshes.interpolation(world.scene, self.camera, settings)?;
+        let count = self.pixels_for(&interpolation, settings);
+        held_out.trace(&self.frame(settings), count.saturating_sub(held_out.paths.len()))?;
+        let paths = held_out.paths.get(..count).unwrap_or(&held_out.paths);
+        let lookup = meshes.direct.view(world.lights, &interpolation.direct).lookup;
+        let needed = needed_points(paths, lookup);
+        stats.add_direct(meshes.direct.evaluate(world, &interpolation.direct, &needed));
+        let direct = LightMeshIntegrator {
+            world,
+            direct: &mut meshes.direct,
+            indirect: None,
+            interpolation: &interpolation,
+        };
+        let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
+        let (shown, _) = held_out.shaded(&direct, 0..count);
+        let (other, rays) = held_out.shaded(&other, 0..count);
+        Ok(Errors {
+            parts: part_errors(&shown, &other, |difference| 0.5 * difference.length_squared()),
+            rays,
+        })
+    }
+
+    /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
+    fn pixels_for(&self, interpolation: &MeshInterpolation, settings: &Settings) -> usize {
+        let (width, height) = settings.view.resolution;
+        let camera_rays = f64::from(width) * f64::from(height) * f64::from(settings.view.samples_per_pixel);
+        let per_pixel = interpolation.direct.neighbourhoods.points_around() * self.world.lights.len() as f32;
+        let affordable = (MEASURED_BY_CAMERA * camera_rays).max(FEWEST_RAYS) / f64::from(per_pixel.max(1.0));
+        (affordable as usize).clamp(PIXELS.0, PIXELS.1)
+    }
+
+    /// Traced shadow edges: what a picture got wrong is found at blocks that are held out; one that is not good enough is made again with more
+    /// rays, at last with all.
+    fn render_traced(
+        &self,
+        mut settings: Settings,
+        asked: f32,
+        meshes: &mut LightMeshes,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        let mut truth: Option<Truth> = None;
+        let mut before: Option<RenderStats> = None;
+        let may_change = settings.shading.integrator == Integrator::Auto;
+        for attempt in 0.. {
+            let (image, mut stats) = self.render_fixed(&settings, meshes)?;
+            if let Some(before) = before.take() {
+                stats.add_earlier(&before);
+            }
+            if stats.integrator == Some(Integrator::Conventional) {
+                stats.accuracy =
+                    Some(Accuracy { asked, found: None, ending: Ending::Exact, rays_for_half: None });
+                return Ok((image, stats));
+            }
+            let mut seconds = 0.0;
+            let found = timed(&mut seconds, || {
+                let truth = match &mut truth {
+                    Some(truth) => truth,
+                    None => truth.insert(self.find_truth(&settings, meshes, &stats)?),
+                };
+                let shown = truth.held_out.of_image(&image);
+                let errors = part_errors(&shown, &truth.pixels, |difference| difference.abs().element_sum());
+                Ok::<_, RenderError>(ErrorEstimate::of(
+                    &errors,
+                    Measure::Absolute,
+                    Some(mean(&image)),
+                    truth.rays,
+                ))
+            })?;
+            stats.seconds.check += seconds;
+            let within = found.is_none_or(|found| found.is_within(asked));
+            if within || (attempt > STRICTER_TIMES || (attempt == STRICTER_TIMES && !may_change)) {
+                let (width, height) = settings.view.resolution;
+                let pixels = f64::from(width) * f64::from(height);
+                let rays_for_half =
+                    found.map(|found| (found.rays as f64 / found.pixels.max(1) as f64 * pixels) as u64);
+                let ending = if within { Ending::Error } else { Ending::Settings };
+                stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
+                return Ok((image, stats));
+            }
+            if attempt == STRICTER_TIMES {
+                settings.shading.integrator = Integrator::Conventional;
+            } else {
+                settings.shading.tolerance *= STRICTER;
+            }
+            before = Some(stats);
+        }
+        Err(RenderError::Stopped)
+    }
+
+    /// Blocks as `conventional` shades them, with the indirect light of the picture.
+    fn find_truth(
+        &self,
+        settings: &Settings,
+        meshes: &mut LightMeshes,
+        stats: &RenderStats,
+    ) -> Result<Truth, RenderError> {
+        let world = self.world;
+        let interpolation = meshes.interpolation(world.scene, self.camera, settings)?;
+        let indirect = meshes.indirect.as_ref().zip(interpolation.indirect.as_ref());
+        let indirect = indirect.map(|(mesh, interpolation)| mesh.view(interpolation));
+        let direct = ConventionalIntegrator { world, scale: settings.shading.direct_scale(), indirect };
+        let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
+        let integrator = WithSurfaceLight { direct, surface };
+        let budget = MEASURED * (stats.rays.camera + stats.rays.shadow + stats.rays.indirect) as f64;
+        let frame = self.frame(settings);
+        let mut truth =
+            Truth { held_out: HeldOut::new(&frame, BLOCK, BLOCKS.1), pixels: Vec::new(), rays: 0 };
+        while !truth.held_out.is_traced() && (truth.pixels.len() < BLOCKS.0 || (truth.rays as f64) < budget) {
+            truth.held_out.trace(&frame, BATCH)?;
+            let (mut pixels, rays) = truth.held_out.shaded(&integrator, truth.pixels.len()..usize::MAX);
+            truth.pixels.append(&mut pixels);
+            truth.rays += rays;
+        }
+        Ok(truth)
+    }
+}
+
+/// What is wrong with parts of a picture.
+#[derive(Default)]
+struct Errors {
+    parts: Vec<PartError>,
+    /// Rays that it took to find out.
+    rays: u64,
+}
+
+impl Errors {
+    /// The error they make; `mean_shown` is the mean of the picture, if there is one yet.
+    fn estimate(&self, mean_shown: Option<f64>) -> Option<ErrorEstimate> {
+        ErrorEstimate::of(&self.parts, Measure::Rmse, mean_shown, self.rays)
+    }
+}
+
+/// Parts of a picture, and how they should look.
+struct Truth {
+    held_out: HeldOut,
+    /// Of the first parts.
+    pixels: Pixels,
+    rays: u64,
+}
+
+/// Mean of all channels of a picture.
+fn mean(image: &Image) -> f64 {
+    let finite = image.pixels().iter().filter(|pixel| pixel.iter().all(|value| value.is_finite()));
+    let (sum, count) = finite.fold((0.0, 0.0), |(sum, count), pixel| {
+        (sum + pixel.iter().map(|&value| f64::from(value)).sum::<f64>(), count + 3.0)
+    });
+    if count > 0.0 { sum / count } else { 0.0 }
+}
