@@ -38,7 +38,7 @@ pub struct ErrorEstimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
-    /// The error is below the limit with 95 % confidence.
+    /// The error is within the limit: pixels or blocks all over the picture say so with 95 % confidence, and the brightest pixels don't contradict.
     Error,
     /// The settings leave nothing open by which the error could be made smaller.
     Settings,
@@ -74,6 +74,8 @@ pub(super) struct PartError {
     pub truth: f64,
     /// Pixels times three.
     pub values: f64,
+    /// What sums over the part were multiplied by, except for `values`.
+    pub weight: f64,
 }
 
 impl PartError {
@@ -91,7 +93,13 @@ impl PartError {
             shown: self.shown - other.shown,
             truth: self.truth - other.truth,
             values: self.values - other.values,
+            weight: self.weight,
         }
+    }
+
+    /// The part for itself.
+    fn unweighted(&self) -> Self {
+        Self { wrong: self.wrong / self.weight, ..*self }
     }
 
     /// What is wrong with a value.
@@ -137,7 +145,7 @@ impl ErrorEstimate {
         let middle = others.clone().sum::<f64>() / count;
         let squares: f64 = others.map(|other| (other - middle).powi(2)).sum();
         let deviation = (squares * (count - 1.0) / count).sqrt();
-        let worst = parts.iter().map(|part| part.difference(measure)).fold(0.0, f64::max);
+        let worst = parts.iter().map(|part| part.unweighted().difference(measure)).fold(0.0, f64::max);
         Some(Self {
             measure,
             error: all.error(measure, mean_shown) as f32,
@@ -178,7 +186,7 @@ impl fmt::Display for Accuracy {
             None => f.write_str("error not measured")?,
         }
         match self.ending {
-            Ending::Error => write!(f, "; below {asked} % with 95 % confidence")?,
+            Ending::Error => write!(f, "; within the {asked} % asked for")?,
             Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
             Ending::Finest => {
                 write!(f, "; asked for {asked} %, but the light mesh is the finest that is tried")?

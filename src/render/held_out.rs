@@ -24,6 +24,8 @@ pub(super) struct HeldOut {
     /// Their camera paths.
     pub paths: Vec<TilePaths>,
     samples: u32,
+    /// How many times each stands for itself, where some are held out more often than others; else empty.
+    weights: Vec<f64>,
 }
 
 /// Pixels of parts, row by row, means over their samples.
@@ -33,7 +35,41 @@ impl HeldOut {
     /// Holds out `count` parts of `side` × `side` pixels all over the picture, or as many as it has.
     pub fn new<A: Accel>(frame: &Frame<A>, side: u32, count: usize) -> Self {
         let tiles = places(frame.view.resolution, side, count);
-        Self { tiles, paths: Vec::new(), samples: frame.view.samples_per_pixel }
+        Self { tiles, paths: Vec::new(), samples: frame.view.samples_per_pixel, weights: Vec::new() }
+    }
+
+    /// Holds out `count` pixels of a picture, half of them by how bright they are, squared: the few that make most of an RMSE are among the
+    /// brightest. Each counts the less, the more likely it was to be taken.
+    ///
+    /// # Errors
+    /// [`RenderError::Stopped`].
+    pub fn by_brightness<A: Accel>(
+        frame: &Frame<A>,
+        image: &Image,
+        count: usize,
+    ) -> Result<Self, RenderError> {
+        let square = |pixel: &[f32; 3]| {
+            let brightness = f64::from(pixel[0] + pixel[1] + pixel[2]);
+            if brightness.is_finite() { brightness * brightness } else { 0.0 }
+        };
+        let even = 1.0 / image.pixels().len() as f64;
+        let sum: f64 = image.pixels().iter().map(square).sum();
+        let (width, step) = (image.width(), 1.0 / count as f64);
+        let mut held_out = Self::new(frame, 1, 0);
+        // Equal steps along the running sum of the probabilities.
+        let (mut passed, mut next) = (0.0, 0.5 * step);
+        for (number, pixel) in (0u32..).zip(image.pixels()) {
+            let by_square = if sum > 0.0 { square(pixel) / sum } else { even };
+            let probability = 0.5 * (even + by_square);
+            passed += probability;
+            while passed > next {
+                held_out.tiles.push(Tile { x: number % width, y: number / width, width: 1, height: 1 });
+                held_out.weights.push(even / probability);
+                next += step;
+            }
+        }
+        held_out.trace(frame, usize::MAX)?;
+        Ok(held_out)
     }
 
     /// Traces the camera paths of the next `count` parts.
@@ -67,6 +103,24 @@ impl HeldOut {
         self.tiles.iter().map(part).collect()
     }
 
+    /// What is wrong with the first parts: `wrong` says what a difference counts.
+    pub fn errors(&self, shown: &Pixels, truth: &Pixels, wrong: impl Fn(Vec3) -> f32) -> Vec<PartError> {
+        let weights = self.weights.iter().copied().chain(std::iter::repeat(1.0));
+        let part = |((shown, truth), weight): ((&Vec<Vec3>, &Vec<Vec3>), f64)| {
+            let mut part = PartError::default();
+            let pixels = shown.iter().zip(truth);
+            for (shown, truth) in pixels.filter(|(shown, truth)| shown.is_finite() && truth.is_finite()) {
+                part.wrong += weight * f64::from(wrong(*shown - *truth));
+                part.shown += weight * f64::from(shown.element_sum());
+                part.truth += weight * f64::from(truth.element_sum());
+                part.values += 3.0;
+            }
+            part.weight = weight;
+            part
+        };
+        shown.iter().zip(truth).zip(weights).map(part).filter(|part| part.values > 0.0).collect()
+    }
+
     /// Whether the paths of all parts are traced.
     pub fn is_traced(&self) -> bool {
         self.paths.len() == self.tiles.len()
@@ -89,23 +143,6 @@ fn shade_part(
     let scale = 1.0 / samples as f32;
     radiance.iter_mut().for_each(|pixel| *pixel *= scale);
     (radiance, counters.shadow_rays + counters.inside_rays)
-}
-
-/// What is wrong with parts of a picture: `wrong` says what a difference counts.
-pub(super) fn part_errors(shown: &Pixels, truth: &Pixels, wrong: impl Fn(Vec3) -> f32) -> Vec<PartError> {
-    let part = |(shown, truth): (&Vec<Vec3>, &Vec<Vec3>)| {
-        let mut error = PartError::default();
-        for (shown, truth) in
-            shown.iter().zip(truth).filter(|(shown, truth)| shown.is_finite() && truth.is_finite())
-        {
-            error.wrong += f64::from(wrong(*shown - *truth));
-            error.shown += f64::from(shown.element_sum());
-            error.truth += f64::from(truth.element_sum());
-            error.values += 3.0;
-        }
-        error
-    };
-    shown.iter().zip(truth).map(part).filter(|part| part.values > 0.0).collect()
 }
 
 /// Parts of a picture of `side` × `side` pixels, at its borders fewer: each once, as many as are asked for if there are. Any first ones of them are

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
 use super::error::RenderError;
 use super::fixed::View;
-use super::held_out::{HeldOut, Pixels, part_errors};
+use super::held_out::{HeldOut, Pixels};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
@@ -44,6 +44,9 @@ const FINEST: u32 = 9;
 /// uncertainty of what is measured.
 const ORDER: f32 = 1.9;
 const HEADROOM: f32 = 1.25;
+
+/// Pictures that are made at most, should the brightest pixels be worse than those all over the picture.
+const MOST_PICTURES: u32 = 2;
 
 /// Mesh points by which the error is halved: 2^(3/[`ORDER`]).
 const POINTS_FOR_HALF: u64 = 3;
@@ -86,32 +89,53 @@ impl<A: Accel> View<'_, A> {
         asked: f32,
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
-        let mut trial = RenderStats::default();
-        let mut seconds = 0.0;
-        let (errors, ending) = timed(&mut seconds, || {
-            let mut held_out = HeldOut::new(&self.frame(&settings), 1, PIXELS.1);
-            self.choose_points(&mut settings, asked, &mut held_out, meshes, &mut trial)
-        })?;
-        let (image, mut stats) = self.render_fixed(&settings, meshes)?;
-        stats.rays.add(&trial.rays);
-        stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
-        stats.seconds.check += seconds;
-        let found = errors.estimate(Some(mean(&image)));
-        let rays_for_half = Some(POINTS_FOR_HALF * stats.rays.shadow);
-        stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
-        Ok((image, stats))
+        let mut open = self.open_spacing(&mut settings, meshes)?;
+        let mut before: Option<RenderStats> = None;
+        for pictures in 1.. {
+            let mut trial = RenderStats::default();
+            let mut seconds = 0.0;
+            timed(&mut seconds, || self.choose_points(&mut settings, asked, &mut open, meshes, &mut trial))?;
+            let (image, mut stats) = self.render_fixed(&settings, meshes)?;
+            let found = timed(&mut seconds, || {
+                let count = self
+                    .pixels_for(&meshes.interpolation(self.world.scene, self.camera, &settings)?, &settings);
+                let mut held_out = HeldOut::by_brightness(&self.frame(&settings), &image, count)?;
+                let errors = self.errors_of(&settings, &mut held_out, meshes, &mut trial)?;
+                Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
+            })?;
+            stats.rays.add(&trial.rays);
+            stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
+            stats.seconds.check += seconds;
+            if let Some(before) = before.take() {
+                stats.add_earlier(&before);
+            }
+            // That the error is small enough was said with confidence before; brighter pixels would have to contradict it.
+            let missed = found.filter(|found| found.error > asked);
+            let ending = match (&mut open, missed) {
+                (_, None) => Ending::Error,
+                (None, _) => Ending::Settings,
+                (Some(open), Some(missed)) => {
+                    open.refine(missed.error / asked);
+                    if pictures < MOST_PICTURES && open.step <= FINEST {
+                        before = Some(stats);
+                        continue;
+                    }
+                    Ending::Finest
+                }
+            };
+            let rays_for_half = Some(POINTS_FOR_HALF * stats.rays.shadow);
+            stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
+            return Ok((image, stats));
+        }
+        Err(RenderError::Stopped)
     }
 
-    /// Puts the coarsest points into the settings whose error at the held-out pixels is within the limit, if their spacing is left open. What
-    /// is evaluated for that is part of the mesh: finer points contain the coarser ones.
-    fn choose_points(
+    /// What is to be found of a spacing that the settings leave open: R is what it would be for the automatic spacing.
+    fn open_spacing(
         &self,
         settings: &mut Settings,
-        asked: f32,
-        held_out: &mut HeldOut,
         meshes: &mut LightMeshes,
-        stats: &mut RenderStats,
-    ) -> Result<(Errors, Ending), RenderError> {
+    ) -> Result<Option<OpenSpacing>, RenderError> {
         let points = &settings.mesh.direct;
         let by_direct = |form| form == IndirectForm::Scalar;
         let is_open = points.spacing == Spacing::Auto
@@ -120,35 +144,42 @@ impl<A: Accel> View<'_, A> {
             && settings.shading.kernel.neighbourhood != Neighbourhood::Nearest
             && !settings.mesh.indirect.as_ref().is_some_and(|indirect| by_direct(indirect.form));
         if !is_open {
-            let errors = self.errors_of(settings, held_out, meshes, stats)?;
-            let within = errors.estimate(None).is_none_or(|estimate| estimate.is_within(asked));
-            let ending = if within { Ending::Error } else { Ending::Settings };
-            return Ok((errors, ending));
+            return Ok(None);
         }
         let radius =
             meshes.interpolation(self.world.scene, self.camera, settings)?.direct.neighbourhoods.radius();
         settings.shading.kernel.radius = Radius::Units(radius);
-        let mut errors = Errors::default();
-        let mut step = 0;
-        while step <= FINEST {
-            let finer = Spacing::Units(Vec3::splat(radius * (-(step as f32) / STEPS_PER_OCTAVE).exp2()));
-            let before = std::mem::replace(&mut settings.mesh.direct.spacing, finer);
-            match self.errors_of(settings, held_out, meshes, stats) {
-                Ok(found) => errors = Errors { rays: errors.rays + found.rays, ..found },
-                Err(RenderError::Mesh(_)) if step > 0 => {
+        let held_out = HeldOut::new(&self.frame(settings), 1, PIXELS.1);
+        Ok(Some(OpenSpacing { radius, step: 0, held_out }))
+    }
+
+    /// Puts the coarsest points into the settings whose error at pixels all over the picture is within the limit, if their spacing is open. What is
+    /// evaluated for that is part of the mesh.
+    fn choose_points(
+        &self,
+        settings: &mut Settings,
+        asked: f32,
+        open: &mut Option<OpenSpacing>,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<(), RenderError> {
+        let Some(open) = open else { return Ok(()) };
+        while open.step <= FINEST {
+            let before = std::mem::replace(&mut settings.mesh.direct.spacing, open.spacing());
+            let errors = match self.errors_of(settings, &mut open.held_out, meshes, stats) {
+                Err(RenderError::Mesh(_)) if open.step > 0 => {
                     settings.mesh.direct.spacing = before;
-                    break;
+                    open.step = FINEST;
+                    return Ok(());
                 }
-                Err(error) => return Err(error),
-            }
-            let Some(estimate) = errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) else {
-                return Ok((errors, Ending::Error));
+                errors => errors?,
             };
-            // As fine as it probably has to be, so that few meshes are tried.
-            let octaves = (HEADROOM * estimate.error / asked).log2() / ORDER;
-            step += ((octaves * STEPS_PER_OCTAVE).round() as u32).max(1);
+            match errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) {
+                Some(estimate) => open.refine(estimate.error / asked),
+                None => return Ok(()),
+            }
         }
-        Ok((errors, Ending::Finest))
+        Ok(())
     }
 
     /// What is wrong with direct light at the held-out pixels.
@@ -179,10 +210,8 @@ impl<A: Accel> View<'_, A> {
         let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
         let (shown, _) = held_out.shaded(&direct, 0..count);
         let (other, rays) = held_out.shaded(&other, 0..count);
-        Ok(Errors {
-            parts: part_errors(&shown, &other, |difference| 0.5 * difference.length_squared()),
-            rays,
-        })
+        let parts = held_out.errors(&shown, &other, |difference| 0.5 * difference.length_squared());
+        Ok(Errors { parts, rays })
     }
 
     /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
@@ -222,7 +251,8 @@ impl<A: Accel> View<'_, A> {
                     None => truth.insert(self.find_truth(&settings, meshes, &stats)?),
                 };
                 let shown = truth.held_out.of_image(&image);
-                let errors = part_errors(&shown, &truth.pixels, |difference| difference.abs().element_sum());
+                let errors =
+                    truth.held_out.errors(&shown, &truth.pixels, |difference| difference.abs().element_sum());
                 Ok::<_, RenderError>(ErrorEstimate::of(
                     &errors,
                     Measure::Absolute,
@@ -279,8 +309,31 @@ impl<A: Accel> View<'_, A> {
     }
 }
 
+/// A spacing that is to be found.
+struct OpenSpacing {
+    /// R.
+    radius: f32,
+    /// What is tried next, see [`OpenSpacing::spacing`].
+    step: u32,
+    /// Pixels at which it is tried.
+    held_out: HeldOut,
+}
+
+impl OpenSpacing {
+    fn spacing(&self) -> Spacing {
+        Spacing::Units(Vec3::splat(self.radius * (-(self.step as f32) / STEPS_PER_OCTAVE).exp2()))
+    }
+
+    /// Goes on to a mesh as fine as it probably has to be, so that few are tried, after one whose error was so many `times` too large.
+    fn refine(&mut self, times: f32) {
+        let octaves = (HEADROOM * times).log2() / ORDER;
+        let next = self.step.saturating_add(((octaves * STEPS_PER_OCTAVE).round() as u32).max(1));
+        // The finest one is tried, unless it was.
+        self.step = if self.step < FINEST { next.min(FINEST) } else { next };
+    }
+}
+
 /// What is wrong with parts of a picture.
-#[derive(Default)]
 struct Errors {
     parts: Vec<PartError>,
     /// Rays that it took to find out.

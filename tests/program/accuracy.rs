@@ -47,7 +47,7 @@ fn a_render_says_how_wrong_it_is() {
         );
         assert_eq!(accuracy["ending"], "error");
         assert!(last.starts_with("error ") && last.contains("held out"), "{last}");
-        assert!(last.contains(&format!("below {} %", 100.0 * asked)), "{last}");
+        assert!(last.contains(&format!("within the {} % asked for", 100.0 * asked)), "{last}");
     }
     let (stats, last) = render(folder.path(), &["--max-error", "0"]);
     assert!(stats["accuracy"].is_null() && !last.starts_with("error"), "{last}");
