@@ -41,7 +41,7 @@ fn true_error(scene: &LoadedScene, image: &Image, settings: &Settings) -> f32 {
 }
 
 /// A mesh of another place, as dense, says how far a mesh is from the mean over D_y: at three spacings between R and R/3 the true error lies within
-/// twice the interval that is given, which is one of 95 % and rests on a tenth of the pixels.
+/// twice the interval that is given, which is one of 95 % and rests on a few dozen pixels.
 #[test]
 fn the_error_that_is_said_is_the_true_one() {
     let scene = scene();
@@ -73,7 +73,7 @@ fn the_error_that_is_asked_for_is_kept() {
         let accuracy = stats.accuracy.expect("measured");
         let found = accuracy.found.expect("per-light is measured");
         assert_eq!(accuracy.ending, Ending::Error);
-        assert!(found.error + found.confidence <= 1.2 * asked, "{found:?}");
+        assert!(found.error <= asked, "{found:?}");
         let truth = true_error(&scene, &image, &settings);
         assert!(truth <= 1.2 * asked, "asked for {asked}, truth is {truth}");
         assert!(stats.rays.shadow > before, "{asked}: {} rays", stats.rays.shadow);
