@@ -77,6 +77,15 @@ impl Entry {
         if let Some(beside) = &self.beside {
             facts.push(("seconds, conventionally", format!("{:.2}", beside.seconds())));
         }
+        let share = |name: &str| {
+            self.picture.stats.pointer(&format!("/accuracy/found/{name}")).and_then(Value::as_f64)
+        };
+        if let Some((error, confidence)) = share("error").zip(share("confidence")) {
+            facts.push((
+                "error of direct light",
+                format!("{:.2} % ± {:.2}, measured", 100.0 * error, 100.0 * confidence),
+            ));
+        }
         for (name, kind) in [("direct mesh points", "direct"), ("indirect mesh points", "indirect")] {
             let total = count(&format!("/mesh_points/{kind}/total"));
             let evaluated = count(&format!("/mesh_points/{kind}/evaluated"));
