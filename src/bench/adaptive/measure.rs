@@ -22,6 +22,7 @@ const CHOSEN_LEVELS: [u32; 2] = [0, 2];
 struct Sizes {
     /// About the longer side of the images whose pixels' errors are known.
     error_side: u32,
+    /// A mesh of a quarter of R has 134 points in D_y: a reference of as few would be as wrong as the mesh.
     reference_samples: u32,
     /// Spacings in units of R.
     spacings: &'static [f32],
@@ -35,7 +36,7 @@ impl Sizes {
             Self { error_side: 8, reference_samples: 16, spacings: &[1.0, 0.5], errors: &[0.1] }
         } else {
             let (spacings, errors) = (&[1.0, 0.75, 0.5, 0.375, 0.25], &[0.1, 0.05, 0.02]);
-            Self { error_side: 40, reference_samples: 128, spacings, errors }
+            Self { error_side: 40, reference_samples: 512, spacings, errors }
         }
     }
 }
