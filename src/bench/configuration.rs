@@ -20,6 +20,8 @@ pub struct Configuration {
     pub spacing: f32,
     /// R, scene units.
     pub radius: f32,
+    /// Coarser lattices that the points build on.
+    pub levels: u32,
 }
 
 /// Estimators, in the order of the report.
@@ -50,7 +52,7 @@ impl Configuration {
                 layout: self.layout.clone(),
                 spacing: Spacing::Units(Vec3::splat(self.spacing)),
                 regions: Vec::new(),
-                levels: 0,
+                levels: self.levels,
             },
             indirect: None,
         };
@@ -107,6 +109,7 @@ pub fn conventional(base: &Settings, resolution: (u32, u32)) -> Settings {
 impl fmt::Display for Configuration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (estimator, layout) = (self.estimator, layout_name(&self.layout));
-        write!(f, "{estimator}, {layout}, spacing {}, R {}", self.spacing, self.radius)
+        write!(f, "{estimator}, {layout}, spacing {}, R {}", self.spacing, self.radius)?;
+        if self.levels > 0 { write!(f, ", levels {}", self.levels) } else { Ok(()) }
     }
 }

@@ -57,8 +57,13 @@ pub fn measure(
     let sizes = Sizes::of(options);
     let mut all = Vec::new();
     for &(radius, spacings) in sizes.meshes {
-        let configuration =
-            |estimator| Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: radius, radius };
+        let configuration = |estimator| Configuration {
+            estimator,
+            layout: LAYOUTS[0].clone(),
+            spacing: radius,
+            radius,
+            levels: 0,
+        };
         let reference = |estimator| {
             log(&format!("reference for {} at R {radius}", estimator));
             reference_image(
@@ -94,7 +99,7 @@ pub fn measure(
                     Series { label: format!("{} {}", estimator, layout_name(layout)), points: Vec::new() };
                 for &spacing in spacings {
                     let layout = layout.clone();
-                    let configuration = Configuration { estimator, layout, spacing, radius };
+                    let configuration = Configuration { estimator, layout, spacing, radius, levels: 0 };
                     let tried = attempt(setup, backend, configuration, &sizes, [&own, &exact], report)?;
                     series.points.push((tried.seconds, tried.own_error));
                     table.rows.push(vec![
@@ -149,7 +154,7 @@ fn attempt(
 }
 
 /// The middle pixels of squares of `step` by `step` pixels.
-fn every(image: &Image, step: u32) -> Result<Image, BenchError> {
+pub fn every(image: &Image, step: u32) -> Result<Image, BenchError> {
     let (width, height) = (image.width(), image.height());
     let middles = |side: u32| (step / 2..side).step_by(step as usize);
     let pixels = middles(height).flat_map(|y| middles(width).filter_map(move |x| image.get(x, y))).collect();
@@ -176,7 +181,7 @@ mod tests {
 
     fn tried(estimator: Estimator, own_error: f64, exact_error: f64, seconds: f64) -> Tried {
         let configuration =
-            Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: 1.0, radius: 1.0 };
+            Configuration { estimator, layout: LAYOUTS[0].clone(), spacing: 1.0, radius: 1.0, levels: 0 };
         Tried { configuration, own_error, exact_error, seconds }
     }
 

@@ -193,6 +193,7 @@ mod tests {
             tables: vec![Table::new("t & u", &["a"])],
             bars: Vec::new(),
             curves: Vec::new(),
+            adaptive: Vec::new(),
             results: None,
             plots: vec![plot(vec![(1.0, 2.0), (10.0, 0.5)]), plot(Vec::new()), plot(vec![(0.0, f64::NAN)])],
         };

@@ -3,6 +3,7 @@
 //! Everything that is compared runs in one process, in turn, and medians are reported with all raw times, so that
 //! ratios mean something on a machine that does other things as well.
 
+mod adaptive;
 mod backends;
 mod bars;
 mod configuration;
@@ -54,6 +55,8 @@ named_enum! {
         Scenes = "scenes",
         /// Light from surfaces in given scenes: time, rays and error over the number of directions
         Indirect = "indirect",
+        /// Light meshes whose points trace only what coarser ones disagree on, and those chosen by their error: error over rays and seconds
+        Adaptive = "adaptive",
     }
 }
 
@@ -70,11 +73,12 @@ pub struct BenchOptions {
     pub backend: BackendChoice,
     /// The program to measure whole processes with; without it these measurements are left out.
     pub program: Option<PathBuf>,
-    /// With [`Benchmark::Scenes`] and [`Benchmark::Indirect`]: scene files, models, and folders of them.
+    /// With [`Benchmark::Scenes`], [`Benchmark::Indirect`] and [`Benchmark::Adaptive`]: scene files, models, and folders of them.
+    /// [`Benchmark::Adaptive`] makes its own where there are none.
     pub scenes: Vec<PathBuf>,
     /// With the same: size of the images instead of each scene's own.
     pub resolution: Option<(u32, u32)>,
-    /// With the same: samples per pixel instead of one with [`Benchmark::Scenes`], and of each scene's own with [`Benchmark::Indirect`].
+    /// With the first two: samples per pixel instead of one with [`Benchmark::Scenes`], and of each scene's own with [`Benchmark::Indirect`].
     pub samples_per_pixel: Option<u32>,
 }
 
@@ -146,5 +150,6 @@ pub fn run(benchmark: Benchmark, options: &BenchOptions, log: &dyn Fn(&str)) -> 
         Benchmark::Rays => rays::run(options, log),
         Benchmark::Scenes => scenes::run(options, log),
         Benchmark::Indirect => indirect::run(options, log),
+        Benchmark::Adaptive => adaptive::run(options, log),
     }
 }

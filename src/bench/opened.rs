@@ -34,10 +34,7 @@ impl Opened {
         let mut opened = opened?;
         let ViewSettings { resolution, samples_per_pixel, .. } = &mut opened.loaded.settings.view;
         *samples_per_pixel = options.samples_per_pixel.or(samples).unwrap_or(*samples_per_pixel);
-        *resolution = options.resolution.unwrap_or(*resolution);
-        if options.quick {
-            *resolution = within(*resolution, QUICK_SIDE);
-        }
+        *resolution = size(*resolution, options);
         opened.loaded.scene.validate().map_err(SessionError::from)?;
         let (build_seconds, built) = timed(|| Backend::build(options.backend, &opened.loaded.scene));
         let backend = built?.backend;
@@ -49,6 +46,20 @@ impl Opened {
         let setup = Setup { scene, camera, settings, load_seconds };
         Ok(Self { setup, backend, build_seconds, bare })
     }
+
+    /// A scene that the benchmark made.
+    pub fn made(mut setup: Setup, options: &BenchOptions) -> Result<Self, BenchError> {
+        let resolution = &mut setup.settings.view.resolution;
+        *resolution = size(*resolution, options);
+        let (build_seconds, built) = timed(|| Backend::build(options.backend, &setup.scene));
+        Ok(Self { setup, backend: built?.backend, build_seconds, bare: false })
+    }
+}
+
+/// The size of images of a scene that has one of its own.
+fn size(own: (u32, u32), options: &BenchOptions) -> (u32, u32) {
+    let size = options.resolution.unwrap_or(own);
+    if options.quick { within(size, QUICK_SIDE) } else { size }
 }
 
 /// A size of the same shape whose longer side is at most `most`.

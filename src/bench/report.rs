@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::adaptive::AdaptiveScene;
 use super::bars::BarPlot;
 use super::indirect::IndirectCurve;
 use super::machine::Machine;
@@ -40,6 +41,9 @@ pub struct Report {
     /// What was found about light from surfaces.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub curves: Vec<IndirectCurve>,
+    /// What was found about meshes whose points build on coarser ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub adaptive: Vec<AdaptiveScene>,
     /// What was found about given scenes; its fields are the report's own.
     #[serde(flatten)]
     pub results: Option<SceneResults>,

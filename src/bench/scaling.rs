@@ -55,6 +55,7 @@ fn configurations(spacing: f32) -> [Configuration; 2] {
         layout: PointLayout::Regular,
         spacing,
         radius: 1.5 * spacing,
+        levels: 0,
     })
 }
 

@@ -1,5 +1,7 @@
 //! The scene that is measured, and single frames of it.
 
+use std::path::Path;
+
 use glam::Vec3;
 use tempfile::TempDir;
 
@@ -11,7 +13,9 @@ use crate::accel::Backend;
 use crate::image::Image;
 use crate::image::metrics::{MetricsOptions, compare};
 use crate::render::{RenderError, RenderStats, render};
+use crate::scene::generate::GenerateError;
 use crate::scene::generate::forest::Forest;
+use crate::scene::generate::interior::Interior;
 use crate::scene::load::load_scene_file;
 use crate::scene::{Camera, Scene};
 use crate::settings::Settings;
@@ -52,14 +56,27 @@ pub fn temporary_folder() -> Result<TempDir, BenchError> {
 ///
 /// The sky is black: it would add to the image's mean, by which errors are divided, but never to the errors.
 pub fn forest(triangles: u32, lights: u32) -> Result<Setup, BenchError> {
+    let mut setup = generated("forest.toml", |folder| Forest { triangles, lights, seed: 1 }.write(folder))?;
+    setup.scene.background = Vec3::ZERO;
+    Ok(setup)
+}
+
+/// The hall of `lightmesh generate interior`.
+pub fn interior(bays: u32, lamps: u32) -> Result<Setup, BenchError> {
+    generated("interior.toml", |folder| Interior { bays, lamps }.write(folder))
+}
+
+/// A scene that `write` puts into a folder under a name.
+fn generated(
+    name: &str,
+    write: impl FnOnce(&Path) -> Result<(), GenerateError>,
+) -> Result<Setup, BenchError> {
     let folder = temporary_folder()?;
-    Forest { triangles, lights, seed: 1 }.write(folder.path())?;
-    let (load_seconds, loaded) = timed(|| load_scene_file(&folder.path().join("forest.toml")));
+    write(folder.path())?;
+    let (load_seconds, loaded) = timed(|| load_scene_file(&folder.path().join(name)));
     let loaded = loaded?;
-    let mut scene = loaded.scene;
-    scene.background = Vec3::ZERO;
     let camera = loaded.cameras.into_iter().next().ok_or(BenchError::NoCamera)?;
-    Ok(Setup { scene, camera, settings: loaded.settings, load_seconds })
+    Ok(Setup { scene: loaded.scene, camera, settings: loaded.settings, load_seconds })
 }
 
 impl Setup {
@@ -93,6 +110,7 @@ pub fn new_report(benchmark: &'static str, backend: String, options: &BenchOptio
         plots: Vec::new(),
         bars: Vec::new(),
         curves: Vec::new(),
+        adaptive: Vec::new(),
         results: None,
     }
 }

@@ -19,13 +19,14 @@ pub struct BenchArgs {
     /// What to measure
     #[arg(default_value_t, value_parser = named::<Benchmark>())]
     benchmark: Benchmark,
-    /// With `scenes` and `indirect`: scene files, models, and folders, which stand for all scenes in them [default: scenes]
+    /// With `scenes`, `indirect` and `adaptive`: scene files, models, and folders, which stand for all scenes in them [default: scenes; with `adaptive` a
+    /// forest and a hall of its own]
     #[arg(value_name = "SCENE")]
     scenes: Vec<PathBuf>,
     /// With the same: size of the images instead of each scene's own
     #[arg(long, value_name = "WxH", value_parser = parse::resolution)]
     resolution: Option<(u32, u32)>,
-    /// With the same: camera rays per pixel; without it one with `scenes`, where light is compared, and each scene's own with `indirect`
+    /// With `scenes` and `indirect`: camera rays per pixel; without it one with `scenes`, where light is compared, and each scene's own with `indirect`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: Option<u32>,
     /// Write raw times and goals as JSON
@@ -55,21 +56,30 @@ pub struct BenchArgs {
 const SCENES: &str = "scenes";
 
 impl BenchArgs {
-    /// Refuses scenes for a benchmark that makes its own.
+    /// Refuses scenes for a benchmark that makes its own, and samples for one that takes one per pixel.
     pub fn check(&self) -> Result<(), String> {
-        let takes_scenes = matches!(self.benchmark, Benchmark::Scenes | Benchmark::Indirect);
-        let changes_scenes = self.resolution.is_some() || self.spp.is_some();
-        if takes_scenes || self.scenes.is_empty() && !changes_scenes {
+        let takes_scenes = match self.benchmark {
+            Benchmark::Scenes | Benchmark::Indirect => return Ok(()),
+            Benchmark::Adaptive => true,
+            _ => self.scenes.is_empty() && self.resolution.is_none(),
+        };
+        if takes_scenes && self.spp.is_none() {
             return Ok(());
         }
         Err(format!(
-            "`bench {}` makes its own scenes; only `bench scenes` and `bench indirect` take some, --resolution and --spp",
+            "`bench {}` makes its own scenes or samples; only `bench scenes`, `bench indirect` and `bench adaptive` take scenes and \
+             --resolution, and the first two of them --spp",
             self.benchmark
         ))
     }
 
     fn scenes(&self) -> Vec<PathBuf> {
-        if self.scenes.is_empty() { vec![PathBuf::from(SCENES)] } else { self.scenes.clone() }
+        let makes_its_own = self.benchmark == Benchmark::Adaptive;
+        if self.scenes.is_empty() && !makes_its_own {
+            vec![PathBuf::from(SCENES)]
+        } else {
+            self.scenes.clone()
+        }
     }
 }
 

@@ -210,6 +210,52 @@ fn indirect_measures_light_from_surfaces() {
     );
 }
 
+/// Meshes that build on coarser ones and meshes chosen by their error, of the scenes it makes and of given ones.
+#[test]
+fn adaptive_measures_error_over_rays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let result = bench(folder.path(), &["adaptive"]);
+    check_form("adaptive", &result);
+    check_adaptive(&result.1, &["forest", "hall"]);
+    assert_eq!(result.2.matches("<svg").count(), 4, "error over rays and over seconds of each");
+    let text = String::from_utf8_lossy(&result.0.stdout);
+    for part in ["uniform", "2 levels", "conventional", "chosen by their error", "at equal error"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+
+    fs::write(folder.path().join("model.obj"), MODEL).expect("writable");
+    fs::write(folder.path().join("scene.toml"), SCENE.to_owned() + LIGHT).expect("writable");
+    let path = folder.path().join("scene.toml");
+    let path = path.to_str().expect("UTF-8");
+    let result =
+        bench_unless_failed(folder.path(), &["adaptive", path, "missing.glb", "--resolution", "24x18"]);
+    check_form("adaptive", &result);
+    check_adaptive(&result.1, &[path]);
+    assert_eq!(result.0.status.code(), Some(1));
+    assert!(result.1["failures"][0]["name"].as_str().is_some_and(|file| file.ends_with("missing.glb")));
+}
+
+/// What is promised of each scene: every kind of mesh with its error and its rays.
+fn check_adaptive(report: &Value, expected: &[&str]) {
+    let scenes = report["adaptive"].as_array().expect("a list");
+    let names: Vec<&str> = scenes.iter().filter_map(|scene| scene["name"].as_str()).collect();
+    assert_eq!(names, expected);
+    for scene in scenes {
+        let list = |key: &str| scene[key].as_array().unwrap_or_else(|| panic!("{key} is a list: {scene}"));
+        let levels: Vec<u64> = list("meshes").iter().filter_map(|mesh| mesh["levels"].as_u64()).collect();
+        assert_eq!(levels, [0, 0, 1, 1, 2, 2]);
+        for mesh in list("meshes").iter().chain(list("chosen")) {
+            assert!(mesh["own_error"].is_number() && mesh["seconds"].is_number(), "{mesh}");
+            assert!(mesh["shadow_rays"].as_u64() >= Some(1), "{mesh}");
+        }
+        for mesh in list("chosen") {
+            assert!(mesh["asked"].is_number() && mesh["found"]["error"].is_number(), "{mesh}");
+        }
+        assert!(scene["conventional"]["shadow_rays"].as_u64() >= Some(1));
+        assert_eq!(list("gains").len(), 2);
+    }
+}
+
 /// A scene that can't be measured is named in every output and in the error at the end, and the others are there.
 #[test]
 fn a_scene_that_cannot_be_measured_takes_nothing_from_the_others() {
@@ -252,7 +298,11 @@ fn a_scene_that_cannot_be_measured_takes_nothing_from_the_others() {
 /// Scenes for a benchmark that makes its own are wrong usage, rather than left out.
 #[test]
 fn benchmarks_that_make_their_scenes_take_none() {
-    for arguments in [&["bench", "rays", "a.toml"][..], &["bench", "--resolution", "8x8"]] {
+    for arguments in [
+        &["bench", "rays", "a.toml"][..],
+        &["bench", "--resolution", "8x8"],
+        &["bench", "adaptive", "--spp", "4"],
+    ] {
         let output =
             Command::new(env!("CARGO_BIN_EXE_lightmesh")).args(arguments).output().expect("the program runs");
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
