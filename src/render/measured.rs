@@ -185,7 +185,8 @@ impl<A: Accel> View<'_, A> {
     /// What is wrong with direct light at the held-out pixels.
     ///
     /// They are compared with what another mesh of the same density gives, whose points lie elsewhere. Both miss the mean over D_y by as much,
-    /// independently of each other, so that the mean of the squared difference is twice that of the error.
+    /// independently of each other, so that the mean of the squared difference is twice that of the error. The other one traces all lights: where a
+    /// mesh has levels it may be the better one by far, and the whole difference is taken for the error, which is then too large rather than too small.
     fn errors_of(
         &self,
         settings: &Settings,
@@ -210,7 +211,8 @@ impl<A: Accel> View<'_, A> {
         let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
         let (shown, _) = held_out.shaded(&direct, 0..count);
         let (other, rays) = held_out.shaded(&other, 0..count);
-        let parts = held_out.errors(&shown, &other, |difference| 0.5 * difference.length_squared());
+        let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
+        let parts = held_out.errors(&shown, &other, |difference| share * difference.length_squared());
         Ok(Errors { parts, rays })
     }
 
