@@ -123,8 +123,9 @@ impl PartError {
     }
 }
 
-/// Two-sided quantile of the normal distribution.
+/// Quantiles of the normal distribution for 95 %, two-sided and one-sided.
 const CONFIDENT: f64 = 1.96;
+const CONFIDENT_BELOW: f64 = 1.645;
 
 impl ErrorEstimate {
     /// From some parts of a picture; `mean_shown` is the mean of the whole, if there is one yet. `None` without parts.
@@ -157,9 +158,9 @@ impl ErrorEstimate {
         })
     }
 
-    /// Whether the error is at most `limit`, with confidence.
+    /// Whether the error is at most `limit`, with 95 % confidence: what is below the interval's lower end doesn't speak against that.
     pub(super) fn is_within(&self, limit: f32) -> bool {
-        self.error + self.confidence <= limit
+        f64::from(self.error) + f64::from(self.confidence) * CONFIDENT_BELOW / CONFIDENT <= f64::from(limit)
     }
 }
 

@@ -30,7 +30,7 @@ const MEASURED: f64 = 0.08;
 
 /// Parts that are held out at least, and at most: pixels where shadows are soft, and blocks where they are traced, whose pixels share
 /// what is found at edges of shadows.
-const PIXELS: (usize, usize) = (64, 2048);
+const PIXELS: (usize, usize) = (96, 2048);
 const BLOCKS: (usize, usize) = (32, 1024);
 const BLOCK: u32 = 8;
 /// Blocks that are shaded before the rays are counted.
