@@ -42,7 +42,7 @@ pub enum Ending {
     Error,
     /// The settings leave nothing open by which the error could be made smaller.
     Settings,
-    /// The finest light mesh that is tried.
+    /// No finer light mesh is tried.
     Finest,
     /// The time is over.
     Time,
@@ -189,9 +189,7 @@ impl fmt::Display for Accuracy {
         match self.ending {
             Ending::Error => write!(f, "; within the {asked} % asked for")?,
             Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
-            Ending::Finest => {
-                write!(f, "; asked for {asked} %, but the light mesh is the finest that is tried")?
-            }
+            Ending::Finest => write!(f, "; asked for {asked} %, but no finer mesh is tried")?,
             Ending::Time => write!(f, "; the time limit ended it, {asked} % were asked for")?,
             Ending::Exact => {}
         }

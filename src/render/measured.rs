@@ -90,12 +90,18 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
         let mut open = self.open_spacing(&mut settings, meshes)?;
-        let mut before: Option<RenderStats> = None;
+        let mut before: Option<(Image, RenderStats)> = None;
         for pictures in 1.. {
             let mut trial = RenderStats::default();
             let mut seconds = 0.0;
-            timed(&mut seconds, || self.choose_points(&mut settings, asked, &mut open, meshes, &mut trial))?;
-            let (image, mut stats) = self.render_fixed(&settings, meshes)?;
+            let chosen = timed(&mut seconds, || {
+                self.choose_points(&mut settings, asked, &mut open, meshes, &mut trial)
+            });
+            let rendered = chosen.and_then(|()| self.render_fixed(&settings, meshes));
+            let (image, mut stats) = match self.or_before(rendered, before.take())? {
+                ended @ (_, RenderStats { accuracy: Some(_), .. }) => return Ok(ended),
+                rendered => rendered,
+            };
             let found = timed(&mut seconds, || {
                 let count = self
                     .pixels_for(&meshes.interpolation(self.world.scene, self.camera, &settings)?, &settings);
@@ -106,9 +112,6 @@ impl<A: Accel> View<'_, A> {
             stats.rays.add(&trial.rays);
             stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
             stats.seconds.check += seconds;
-            if let Some(before) = before.take() {
-                stats.add_earlier(&before);
-            }
             // That the error is small enough was said with confidence before; brighter pixels would have to contradict it.
             let missed = found.filter(|found| found.error > asked);
             let ending = match (&mut open, missed) {
@@ -116,18 +119,37 @@ impl<A: Accel> View<'_, A> {
                 (None, _) => Ending::Settings,
                 (Some(open), Some(missed)) => {
                     open.refine(missed.error / asked);
-                    if pictures < MOST_PICTURES && open.step <= FINEST {
-                        before = Some(stats);
-                        continue;
-                    }
                     Ending::Finest
                 }
             };
             let rays_for_half = Some(POINTS_FOR_HALF * stats.rays.shadow);
             stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
-            return Ok((image, stats));
+            let is_last = pictures >= MOST_PICTURES || open.as_ref().is_none_or(|open| open.step > FINEST);
+            if ending != Ending::Finest || is_last {
+                return Ok((image, stats));
+            }
+            before = Some((image, stats));
         }
         Err(RenderError::Stopped)
+    }
+
+    /// What was rendered, with what a picture before it took; or that picture, with how wrong it is, if there was no time for another one.
+    fn or_before(
+        &self,
+        rendered: Result<(Image, RenderStats), RenderError>,
+        before: Option<(Image, RenderStats)>,
+    ) -> Result<(Image, RenderStats), RenderError> {
+        match (rendered, before) {
+            (Ok((image, mut stats)), Some((_, before))) => {
+                stats.add_earlier(&before);
+                Ok((image, stats))
+            }
+            (Err(RenderError::Stopped), Some((image, mut stats))) if self.stop.is_late() => {
+                stats.accuracy.iter_mut().for_each(|accuracy| accuracy.ending = Ending::Time);
+                Ok((image, stats))
+            }
+            (rendered, _) => rendered,
+        }
     }
 
     /// What is to be found of a spacing that the settings leave open: R is what it would be for the automatic spacing.
@@ -234,13 +256,14 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
         let mut truth: Option<Truth> = None;
-        let mut before: Option<RenderStats> = None;
+        let mut before: Option<(Image, RenderStats)> = None;
         let may_change = settings.shading.integrator == Integrator::Auto;
         for attempt in 0.. {
-            let (image, mut stats) = self.render_fixed(&settings, meshes)?;
-            if let Some(before) = before.take() {
-                stats.add_earlier(&before);
-            }
+            let rendered = self.render_fixed(&settings, meshes);
+            let (image, mut stats) = match self.or_before(rendered, before.take())? {
+                ended @ (_, RenderStats { accuracy: Some(_), .. }) => return Ok(ended),
+                rendered => rendered,
+            };
             if stats.integrator == Some(Integrator::Conventional) {
                 stats.accuracy =
                     Some(Accuracy { asked, found: None, ending: Ending::Exact, rays_for_half: None });
@@ -264,13 +287,13 @@ impl<A: Accel> View<'_, A> {
             })?;
             stats.seconds.check += seconds;
             let within = found.is_none_or(|found| found.is_within(asked));
-            if within || (attempt > STRICTER_TIMES || (attempt == STRICTER_TIMES && !may_change)) {
-                let (width, height) = settings.view.resolution;
-                let pixels = f64::from(width) * f64::from(height);
-                let rays_for_half =
-                    found.map(|found| (found.rays as f64 / found.pixels.max(1) as f64 * pixels) as u64);
-                let ending = if within { Ending::Error } else { Ending::Settings };
-                stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
+            let (width, height) = settings.view.resolution;
+            let pixels = f64::from(width) * f64::from(height);
+            let per_pixel = |found: ErrorEstimate| found.rays as f64 / found.pixels.max(1) as f64;
+            let rays_for_half = found.map(|found| (per_pixel(found) * pixels) as u64);
+            let ending = if within { Ending::Error } else { Ending::Settings };
+            stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
+            if within || attempt > STRICTER_TIMES || (attempt == STRICTER_TIMES && !may_change) {
                 return Ok((image, stats));
             }
             if attempt == STRICTER_TIMES {
@@ -278,7 +301,7 @@ impl<A: Accel> View<'_, A> {
             } else {
                 settings.shading.tolerance *= STRICTER;
             }
-            before = Some(stats);
+            before = Some((image, stats));
         }
         Err(RenderError::Stopped)
     }
