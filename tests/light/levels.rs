@@ -8,12 +8,13 @@ use lightmesh::settings::{Integrator, Leaks, PointLayout, Radius, Settings, Spac
 
 use crate::common::{Builder, bits, forest, grey, picture, session, settings_at};
 
-/// Two halls with a wall and a door between them, and lights in both: most of space sees all lights of its hall, and none of the other's.
+/// Two halls with a door between them, and lights in both: most of space sees all lights of its hall, and none of the other's. The wall between
+/// them is a hundredth of the coarsest spacing thick that is tried here.
 fn halls() -> (Scene, Camera) {
     let mut builder = Builder::default();
     builder.cuboid(Vec3::ZERO, Vec3::new(12.0, 3.0, 6.0), true, 0);
-    builder.cuboid(Vec3::new(5.9, 0.0, 0.0), Vec3::new(6.1, 3.0, 2.5), false, 0);
-    builder.cuboid(Vec3::new(5.9, 0.0, 3.5), Vec3::new(6.1, 3.0, 6.0), false, 0);
+    builder.cuboid(Vec3::new(6.0, 0.0, 0.0), Vec3::new(6.003, 3.0, 2.5), false, 0);
+    builder.cuboid(Vec3::new(6.0, 0.0, 3.5), Vec3::new(6.003, 3.0, 6.0), false, 0);
     let light = |number: u32| {
         let position = Vec3::new(0.6 + 1.2 * (number % 10) as f32, 2.7, 1.0 + 2.0 * (number / 10) as f32);
         Light::point(position, Vec3::ONE)

@@ -99,15 +99,22 @@ impl PeriodicPoints {
     fn for_each_in_cells(&self, (first, last): (IVec3, IVec3), mut each: impl FnMut(u64, Vec3)) {
         for z in first.z..=last.z {
             for y in first.y..=last.y {
-                for x in first.x..=last.x {
+                let mut x = first.x;
+                while x <= last.x {
+                    // The cells of a row that lie in one tile: what the tile is, is found once for all of them.
                     let number = TILES.of(IVec3::new(x, y, z));
                     let corner = TILES.first_cell(number);
-                    let [x, y, z] = [x - corner.x, y - corner.y, z - corner.z];
-                    let (begin, end) = self.cells[((z * EDGE + y) * EDGE + x) as usize];
-                    for index in begin..end {
-                        let position = self.at(corner, self.points[index as usize]);
-                        each(number * TILE_IDS + u64::from(index), position);
+                    let row = ((z - corner.z) * EDGE + y - corner.y) * EDGE;
+                    let end = last.x.min(corner.x + EDGE - 1);
+                    for &(begin, end) in
+                        &self.cells[(row + x - corner.x) as usize..=(row + end - corner.x) as usize]
+                    {
+                        for index in begin..end {
+                            let position = self.at(corner, self.points[index as usize]);
+                            each(number * TILE_IDS + u64::from(index), position);
+                        }
                     }
+                    x = end + 1;
                 }
             }
         }
