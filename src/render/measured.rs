@@ -36,9 +36,11 @@ const BLOCK: u32 = 8;
 /// Blocks that are shaded before the rays are counted.
 const BATCH: usize = 16;
 
-/// Spacings that are tried are R times powers of 2, this many to an octave, down to R/8: beyond, conventional tracing costs less.
+/// Spacings that are tried are R times powers of 2, this many to an octave, down to R/4: already there a surface point has some 130 points to weigh, which
+/// takes longer than conventional tracing unless lights are many, and memory for the points grows eightfold with each further octave. Who wants a finer
+/// mesh than that can name its spacing.
 const STEPS_PER_OCTAVE: f32 = 3.0;
-const FINEST: u32 = 9;
+const FINEST: u32 = 6;
 
 /// The error falls with about this power of the spacing, by what `lightmesh bench` finds on the forest; the first guess leaves some room for the
 /// uncertainty of what is measured.
