@@ -107,6 +107,7 @@ impl Overrides {
         view.filter_width = self.filter_width.or(view.filter_width);
         set(&mut output.exposure, self.exposure);
         limits.max_error = self.max_error.or(limits.max_error);
+        limits.estimator_open &= self.estimator.is_none();
         set(&mut limits.time, self.time_limit.map(|limit| limit.0));
         set(&mut limits.steps, self.steps);
     }

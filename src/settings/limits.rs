@@ -8,6 +8,8 @@ pub struct Limits {
     /// The error that direct light may have, as a share of the picture's mean brightness (method §10); 0 takes the other settings as
     /// they are and measures nothing, `None` leaves it to the program: nothing is measured.
     pub max_error: Option<f32>,
+    /// Whether `directional` may take the place of `per-light` where lights are many and the error allows it.
+    pub estimator_open: bool,
     /// Time after which no further step is taken and the last one ends, with the best whole picture so far.
     pub time: Option<Duration>,
     /// Whole pictures that are made one after the other, each better than the one before, at least 1.
@@ -24,6 +26,6 @@ impl Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { max_error: None, time: None, steps: 1 }
+        Self { max_error: None, estimator_open: false, time: None, steps: 1 }
     }
 }

@@ -81,6 +81,21 @@ fn the_error_that_is_asked_for_is_kept() {
     }
 }
 
+/// Where lights are many and the estimator is left open, the one whose cost doesn't depend on them takes over, if it is good enough by the measure of the
+/// other; who names an estimator gets it.
+#[test]
+fn an_open_estimator_is_chosen_by_its_error() {
+    let scene = forest(3_000, 48);
+    let mut settings = settings(0.2);
+    let (per_light, _) = rendered(&scene, &settings);
+    settings.limits.estimator_open = true;
+    let (image, stats) = rendered(&scene, &settings);
+    assert!(bits(&image) != bits(&per_light), "another estimator is another picture");
+    assert_eq!(stats.accuracy.map(|accuracy| accuracy.ending), Some(Ending::Error));
+    let truth = true_error(&scene, &image, &settings);
+    assert!(truth <= 1.2 * 0.2, "{truth}");
+}
+
 /// What is tried is part of the mesh: a second render knows it all, and is the same to the bit. So is one that knew nothing, on other blocks.
 #[test]
 fn a_chosen_mesh_is_kept_and_depends_on_nothing_else() {
@@ -173,7 +188,7 @@ fn time_ends_a_render_with_a_whole_picture() {
     let (image, stats) = rendered(&scene, &settings);
     let accuracy = stats.accuracy.expect("asked for");
     assert_eq!((accuracy.ending, accuracy.found), (Ending::Time, None));
-    settings.limits = Limits { max_error: None, time: None, steps: 1 };
+    settings.limits = Limits::default();
     settings.shading.kernel.neighbourhood = Neighbourhood::Nearest;
     let (fine, _) = rendered(&scene, &settings);
     let ratio = |image: &Image| image.pixels().iter().flatten().sum::<f32>();

@@ -43,9 +43,10 @@ points::point_table! {
 impl LightMeshTable {
     /// Puts what is given in place of the defaults; files lie in `folder`.
     pub fn apply(&self, settings: &mut Settings, folder: &Path, places: &Places) -> Result<(), LoadError> {
-        let Settings { mesh, shading, .. } = settings;
+        let Settings { mesh, shading, limits, .. } = settings;
         self.point_keys("light_mesh").apply(&mut mesh.direct, &mut shading.kernel, folder, places)?;
         mesh.direct.levels = self.levels.map_or(mesh.direct.levels, |count| count.0);
+        limits.estimator_open = self.estimator.is_none();
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
         shading.resolve = self.resolve.unwrap_or(shading.resolve);
         shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);

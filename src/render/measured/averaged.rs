@@ -1,21 +1,19 @@
-//! Pictures as good as they were asked for: what is wrong is measured at parts that are held out (method §10).
+//! Averaged shadows as good as they were asked for: pixels that are held out choose the mesh.
 
 use glam::Vec3;
 
-use super::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
-use super::error::RenderError;
-use super::fixed::View;
-use super::held_out::{HeldOut, Pixels};
-use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
-use super::meshes::{LightMeshes, MeshInterpolation};
-use super::need::needed_points;
-use super::stats::{RenderStats, timed};
-use super::surface_light::{SurfaceLight, WithSurfaceLight};
+use super::mean;
 use crate::accel::Accel;
 use crate::image::Image;
-use crate::settings::{
-    Estimator, IndirectForm, Integrator, Neighbourhood, PointLayout, Radius, Resolve, Settings, Spacing,
-};
+use crate::render::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
+use crate::render::error::RenderError;
+use crate::render::fixed::View;
+use crate::render::held_out::{HeldOut, Pixels};
+use crate::render::integrators::{LightMeshIntegrator, ReferenceIntegrator};
+use crate::render::meshes::{LightMeshes, MeshInterpolation};
+use crate::render::need::needed_points;
+use crate::render::stats::{RenderStats, timed};
+use crate::settings::{Estimator, IndirectForm, Neighbourhood, PointLayout, Radius, Settings, Spacing};
 
 /// Where the points of the other mesh lie, in spacings: far from all points of a regular mesh and from the centres of its cells.
 const SHIFT: Vec3 = Vec3::new(0.27, 0.72, 0.23);
@@ -25,16 +23,8 @@ const SHIFT: Vec3 = Vec3::new(0.27, 0.72, 0.23);
 const MEASURED_BY_CAMERA: f64 = 0.02;
 const FEWEST_RAYS: f64 = 5e4;
 
-/// The same where shadows are traced, as a share of all rays.
-const MEASURED: f64 = 0.08;
-
-/// Parts that are held out at least, and at most: pixels where shadows are soft, and blocks where they are traced, whose pixels share
-/// what is found at edges of shadows.
+/// Pixels that are held out at least, and at most.
 const PIXELS: (usize, usize) = (96, 2048);
-const BLOCKS: (usize, usize) = (32, 1024);
-const BLOCK: u32 = 8;
-/// Blocks that are shaded before the rays are counted.
-const BATCH: usize = 16;
 
 /// Spacings that are tried are R times powers of 2, this many to an octave, down to R/4: already there a surface point has some 130 points to weigh, which
 /// takes longer than conventional tracing unless lights are many, and memory for the points grows eightfold with each further octave. Who wants a finer
@@ -47,50 +37,24 @@ const FINEST: u32 = 6;
 const ORDER: f32 = 1.9;
 const HEADROOM: f32 = 1.25;
 
+/// From so many lights on `directional`, whose cost per pixel doesn't depend on them, is faster than `per-light`.
+const MANY_LIGHTS: usize = 32;
+
 /// Pictures that are made at most, should the brightest pixels be worse than those all over the picture.
 const MOST_PICTURES: u32 = 2;
 
 /// Mesh points by which the error is halved: 2^(3/[`ORDER`]).
 const POINTS_FOR_HALF: u64 = 3;
 
-/// What the tolerance of hybrid shadows is multiplied by, and how often, before all rays are traced.
-const STRICTER: f32 = 0.25;
-const STRICTER_TIMES: u32 = 2;
-
 impl<A: Accel> View<'_, A> {
-    /// Renders with an error of at most `asked`, if it is above 0 and can be measured.
-    pub(super) fn render_measured(
-        &self,
-        settings: &Settings,
-        asked: f32,
-        meshes: &mut LightMeshes,
-    ) -> Result<(Image, RenderStats), RenderError> {
-        let shading = &settings.shading;
-        let is_linear = matches!(shading.estimator, Estimator::PerLight | Estimator::Directional);
-        let is_mesh = matches!(shading.integrator, Integrator::Auto | Integrator::LightMesh);
-        if asked <= 0.0 || self.world.lights.is_empty() || !is_linear || !is_mesh {
-            let (image, mut stats) = self.render_fixed(settings, meshes)?;
-            if asked > 0.0 {
-                let exact = shading.integrator == Integrator::Conventional || self.world.lights.is_empty();
-                let ending = if exact { Ending::Exact } else { Ending::Settings };
-                stats.accuracy = Some(Accuracy { asked, found: None, ending, rays_for_half: None });
-            }
-            return Ok((image, stats));
-        }
-        if shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight {
-            self.render_traced(settings.clone(), asked, meshes)
-        } else {
-            self.render_averaged(settings.clone(), asked, meshes)
-        }
-    }
-
     /// Averaged shadows: the coarsest mesh that is good enough at pixels that are held out makes the picture.
-    fn render_averaged(
+    pub(super) fn render_averaged(
         &self,
         mut settings: Settings,
         asked: f32,
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
+        let meant = settings.shading.estimator;
         let mut open = self.open_spacing(&mut settings, meshes)?;
         let mut before: Option<(Image, RenderStats)> = None;
         for pictures in 1.. {
@@ -108,7 +72,7 @@ impl<A: Accel> View<'_, A> {
                 let count = self
                     .pixels_for(&meshes.interpolation(self.world.scene, self.camera, &settings)?, &settings);
                 let mut held_out = HeldOut::by_brightness(&self.frame(&settings), &image, count)?;
-                let errors = self.errors_of(&settings, &mut held_out, meshes, &mut trial)?;
+                let errors = self.errors_of(&settings, meant, &mut held_out, meshes, &mut trial)?;
                 Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
             })?;
             stats.rays.add(&trial.rays);
@@ -133,25 +97,6 @@ impl<A: Accel> View<'_, A> {
             before = Some((image, stats));
         }
         Err(RenderError::Stopped)
-    }
-
-    /// What was rendered, with what a picture before it took; or that picture, with how wrong it is, if there was no time for another one.
-    fn or_before(
-        &self,
-        rendered: Result<(Image, RenderStats), RenderError>,
-        before: Option<(Image, RenderStats)>,
-    ) -> Result<(Image, RenderStats), RenderError> {
-        match (rendered, before) {
-            (Ok((image, mut stats)), Some((_, before))) => {
-                stats.add_earlier(&before);
-                Ok((image, stats))
-            }
-            (Err(RenderError::Stopped), Some((image, mut stats))) if self.stop.is_late() => {
-                stats.accuracy.iter_mut().for_each(|accuracy| accuracy.ending = Ending::Time);
-                Ok((image, stats))
-            }
-            (rendered, _) => rendered,
-        }
     }
 
     /// What is to be found of a spacing that the settings leave open: R is what it would be for the automatic spacing.
@@ -190,7 +135,8 @@ impl<A: Accel> View<'_, A> {
         let Some(open) = open else { return Ok(()) };
         while open.step <= FINEST {
             let before = std::mem::replace(&mut settings.mesh.direct.spacing, open.spacing());
-            let errors = match self.errors_of(settings, &mut open.held_out, meshes, stats) {
+            let meant = settings.shading.estimator;
+            let errors = match self.errors_of(settings, meant, &mut open.held_out, meshes, stats) {
                 Err(RenderError::Mesh(_)) if open.step > 0 => {
                     settings.mesh.direct.spacing = before;
                     open.step = FINEST;
@@ -200,13 +146,35 @@ impl<A: Accel> View<'_, A> {
             };
             match errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) {
                 Some(estimate) => open.refine(estimate.error / asked),
-                None => return Ok(()),
+                None => return self.choose_estimator(settings, asked, open, meshes, stats),
             }
         }
         Ok(())
     }
 
-    /// What is wrong with direct light at the held-out pixels.
+    /// Takes `directional` where it may take the place of `per-light`, costs less and is good enough.
+    fn choose_estimator(
+        &self,
+        settings: &mut Settings,
+        asked: f32,
+        open: &mut OpenSpacing,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<(), RenderError> {
+        let meant = settings.shading.estimator;
+        let may = settings.limits.estimator_open && meant == Estimator::PerLight;
+        if may && self.world.lights.len() >= MANY_LIGHTS {
+            settings.shading.estimator = Estimator::Directional;
+            let errors = self.errors_of(settings, meant, &mut open.held_out, meshes, stats)?;
+            if errors.estimate(None).is_some_and(|estimate| !estimate.is_within(asked)) {
+                settings.shading.estimator = meant;
+            }
+        }
+        Ok(())
+    }
+
+    /// What is wrong with direct light at the held-out pixels, in a picture that is `meant` to be by an estimator, perhaps another than that of the
+    /// settings.
     ///
     /// They are compared with what another mesh of the same density gives, whose points lie elsewhere. Both miss the mean over D_y by as much,
     /// independently of each other, so that the mean of the squared difference is twice that of the error. The other one traces all lights: where a
@@ -214,10 +182,52 @@ impl<A: Accel> View<'_, A> {
     fn errors_of(
         &self,
         settings: &Settings,
+        meant: Estimator,
         held_out: &mut HeldOut,
         meshes: &mut LightMeshes,
         stats: &mut RenderStats,
     ) -> Result<Errors, RenderError> {
+        let world = self.world;
+        if settings.shading.estimator != meant {
+            return self.errors_of_another(settings, meant, held_out, meshes, stats);
+        }
+        let (shown, count) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
+        let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
+        let (other, rays) = held_out.shaded(&other, 0..count);
+        let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
+        let parts = held_out.errors(&shown, &other, |difference| share * difference.length_squared());
+        Ok(Errors { parts, rays })
+    }
+
+    /// The same with an estimator that isn't the one that is meant: what it differs by from the other mesh, without what is that mesh's own error.
+    fn errors_of_another(
+        &self,
+        settings: &Settings,
+        meant: Estimator,
+        held_out: &mut HeldOut,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<Errors, RenderError> {
+        let mut as_meant = settings.clone();
+        as_meant.shading.estimator = meant;
+        let (right, count) = self.shaded_by_mesh(&as_meant, held_out, meshes, stats)?;
+        let (shown, _) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
+        let other = ReferenceIntegrator::of_shifted_mesh(self.world, &as_meant, SHIFT)?;
+        let (other, rays) = held_out.shaded(&other, 0..count);
+        let mut parts = held_out.errors(&shown, &other, |difference| difference.length_squared());
+        let own = held_out.errors(&right, &other, |difference| 0.5 * difference.length_squared());
+        parts.iter_mut().zip(&own).for_each(|(part, own)| part.wrong -= own.wrong);
+        Ok(Errors { parts, rays })
+    }
+
+    /// Direct light of held-out pixels by a mesh, as many of them as are held out for it, and their number.
+    fn shaded_by_mesh(
+        &self,
+        settings: &Settings,
+        held_out: &mut HeldOut,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<(Pixels, usize), RenderError> {
         let world = self.world;
         let interpolation = meshes.interpolation(world.scene, self.camera, settings)?;
         let count = self.pixels_for(&interpolation, settings);
@@ -232,12 +242,8 @@ impl<A: Accel> View<'_, A> {
             indirect: None,
             interpolation: &interpolation,
         };
-        let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
         let (shown, _) = held_out.shaded(&direct, 0..count);
-        let (other, rays) = held_out.shaded(&other, 0..count);
-        let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
-        let parts = held_out.errors(&shown, &other, |difference| share * difference.length_squared());
-        Ok(Errors { parts, rays })
+        Ok((shown, count))
     }
 
     /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
@@ -247,92 +253,6 @@ impl<A: Accel> View<'_, A> {
         let per_pixel = interpolation.direct.neighbourhoods.points_around() * self.world.lights.len() as f32;
         let affordable = (MEASURED_BY_CAMERA * camera_rays).max(FEWEST_RAYS) / f64::from(per_pixel.max(1.0));
         (affordable as usize).clamp(PIXELS.0, PIXELS.1)
-    }
-
-    /// Traced shadow edges: what a picture got wrong is found at blocks that are held out; one that is not good enough is made again with more
-    /// rays, at last with all.
-    fn render_traced(
-        &self,
-        mut settings: Settings,
-        asked: f32,
-        meshes: &mut LightMeshes,
-    ) -> Result<(Image, RenderStats), RenderError> {
-        let mut truth: Option<Truth> = None;
-        let mut before: Option<(Image, RenderStats)> = None;
-        let may_change = settings.shading.integrator == Integrator::Auto;
-        for attempt in 0.. {
-            let rendered = self.render_fixed(&settings, meshes);
-            let (image, mut stats) = match self.or_before(rendered, before.take())? {
-                ended @ (_, RenderStats { accuracy: Some(_), .. }) => return Ok(ended),
-                rendered => rendered,
-            };
-            if stats.integrator == Some(Integrator::Conventional) {
-                stats.accuracy =
-                    Some(Accuracy { asked, found: None, ending: Ending::Exact, rays_for_half: None });
-                return Ok((image, stats));
-            }
-            let mut seconds = 0.0;
-            let found = timed(&mut seconds, || {
-                let truth = match &mut truth {
-                    Some(truth) => truth,
-                    None => truth.insert(self.find_truth(&settings, meshes, &stats)?),
-                };
-                let shown = truth.held_out.of_image(&image);
-                let errors =
-                    truth.held_out.errors(&shown, &truth.pixels, |difference| difference.abs().element_sum());
-                Ok::<_, RenderError>(ErrorEstimate::of(
-                    &errors,
-                    Measure::Absolute,
-                    Some(mean(&image)),
-                    truth.rays,
-                ))
-            })?;
-            stats.seconds.check += seconds;
-            let within = found.is_none_or(|found| found.is_within(asked));
-            let (width, height) = settings.view.resolution;
-            let pixels = f64::from(width) * f64::from(height);
-            let per_pixel = |found: ErrorEstimate| found.rays as f64 / found.pixels.max(1) as f64;
-            let rays_for_half = found.map(|found| (per_pixel(found) * pixels) as u64);
-            let ending = if within { Ending::Error } else { Ending::Settings };
-            stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
-            if within || attempt > STRICTER_TIMES || (attempt == STRICTER_TIMES && !may_change) {
-                return Ok((image, stats));
-            }
-            if attempt == STRICTER_TIMES {
-                settings.shading.integrator = Integrator::Conventional;
-            } else {
-                settings.shading.tolerance *= STRICTER;
-            }
-            before = Some((image, stats));
-        }
-        Err(RenderError::Stopped)
-    }
-
-    /// Blocks as `conventional` shades them, with the indirect light of the picture.
-    fn find_truth(
-        &self,
-        settings: &Settings,
-        meshes: &mut LightMeshes,
-        stats: &RenderStats,
-    ) -> Result<Truth, RenderError> {
-        let world = self.world;
-        let interpolation = meshes.interpolation(world.scene, self.camera, settings)?;
-        let indirect = meshes.indirect.as_ref().zip(interpolation.indirect.as_ref());
-        let indirect = indirect.map(|(mesh, interpolation)| mesh.view(interpolation));
-        let direct = ConventionalIntegrator { world, scale: settings.shading.direct_scale(), indirect };
-        let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
-        let integrator = WithSurfaceLight { direct, surface };
-        let budget = MEASURED * (stats.rays.camera + stats.rays.shadow + stats.rays.indirect) as f64;
-        let frame = self.frame(settings);
-        let mut truth =
-            Truth { held_out: HeldOut::new(&frame, BLOCK, BLOCKS.1), pixels: Vec::new(), rays: 0 };
-        while !truth.held_out.is_traced() && (truth.pixels.len() < BLOCKS.0 || (truth.rays as f64) < budget) {
-            truth.held_out.trace(&frame, BATCH)?;
-            let (mut pixels, rays) = truth.held_out.shaded(&integrator, truth.pixels.len()..usize::MAX);
-            truth.pixels.append(&mut pixels);
-            truth.rays += rays;
-        }
-        Ok(truth)
     }
 }
 
@@ -372,21 +292,4 @@ impl Errors {
     fn estimate(&self, mean_shown: Option<f64>) -> Option<ErrorEstimate> {
         ErrorEstimate::of(&self.parts, Measure::Rmse, mean_shown, self.rays)
     }
-}
-
-/// Parts of a picture, and how they should look.
-struct Truth {
-    held_out: HeldOut,
-    /// Of the first parts.
-    pixels: Pixels,
-    rays: u64,
-}
-
-/// Mean of all channels of a picture.
-fn mean(image: &Image) -> f64 {
-    let finite = image.pixels().iter().filter(|pixel| pixel.iter().all(|value| value.is_finite()));
-    let (sum, count) = finite.fold((0.0, 0.0), |(sum, count), pixel| {
-        (sum + pixel.iter().map(|&value| f64::from(value)).sum::<f64>(), count + 3.0)
-    });
-    if count > 0.0 { sum / count } else { 0.0 }
 }
