@@ -190,6 +190,7 @@ impl fmt::Display for Accuracy {
             Ending::Error => write!(f, "; within the {asked} % asked for")?,
             Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
             Ending::Finest => write!(f, "; asked for {asked} %, but no finer mesh is tried")?,
+            Ending::Time if self.asked == 0.0 => f.write_str("; the time limit ended it")?,
             Ending::Time => write!(f, "; the time limit ended it, {asked} % were asked for")?,
             Ending::Exact => {}
         }

@@ -48,7 +48,6 @@ fn render_frame<A: Accel>(
 ) -> Result<(Image, RenderStats), RenderError> {
     let mut stats = RenderStats::default();
     let world = frame.world;
-    meshes.renew_lights(world.lights);
     let integrator = match settings.shading.integrator {
         Integrator::Auto => {
             let choice = choose(&frame, camera, settings, meshes, &mut stats)?;

@@ -22,6 +22,8 @@ impl<A: Accel> View<'_, A> {
         settings: &Settings,
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
+        // Before anything is tried: bits belong to the lights that they are of.
+        meshes.renew_lights(self.world.lights);
         let limits = settings.limits;
         let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
         // Who is short of time needs a first picture soon.

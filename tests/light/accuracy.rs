@@ -111,6 +111,19 @@ fn a_chosen_mesh_is_kept_and_depends_on_nothing_else() {
     assert!(bits(&first) == bits(&second) && bits(&first) == bits(&other));
 }
 
+/// Which triangles are among the lights depends on the settings: what a session knows of other lights is nothing that a mesh could be chosen by.
+#[test]
+fn a_mesh_is_chosen_by_the_lights_that_it_is_for() {
+    let mut scene = scene();
+    scene.scene.add_rectangle(Vec3::Y * 7.0, Vec3::X * 2.0, Vec3::Z, Vec3::splat(3.0));
+    let mut session = session(&scene.scene);
+    let mut settings = settings(0.1);
+    session.render(&scene.cameras[0], &settings).expect("an image");
+    settings.shading.lambertian = true;
+    let (image, _) = session.render(&scene.cameras[0], &settings).expect("an image");
+    assert!(bits(&image) == bits(&rendered(&scene, &settings).0));
+}
+
 /// Traced shadows that take everything on trust are wrong; that is found, and they are made again until they are as good as asked for.
 #[test]
 fn traced_shadows_that_are_wrong_are_made_again() {

@@ -74,13 +74,15 @@ impl<A: Accel> View<'_, A> {
                 let mut held_out = HeldOut::by_brightness(&self.frame(&settings), &image, count)?;
                 let errors = self.errors_of(&settings, meant, &mut held_out, meshes, &mut trial)?;
                 Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
-            })?;
+            });
+            let (found, is_late) = self.or_unmeasured(found)?;
             stats.rays.add(&trial.rays);
             stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
             stats.seconds.check += seconds;
             // That the error is small enough was said with confidence before; brighter pixels would have to contradict it.
             let missed = found.filter(|found| found.error > asked);
             let ending = match (&mut open, missed) {
+                _ if is_late => Ending::Time,
                 (_, None) => Ending::Error,
                 (None, _) => Ending::Settings,
                 (Some(open), Some(missed)) => {
@@ -187,35 +189,22 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
         stats: &mut RenderStats,
     ) -> Result<Errors, RenderError> {
-        let world = self.world;
-        if settings.shading.estimator != meant {
-            return self.errors_of_another(settings, meant, held_out, meshes, stats);
-        }
-        let (shown, count) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
-        let other = ReferenceIntegrator::of_shifted_mesh(world, settings, SHIFT)?;
-        let (other, rays) = held_out.shaded(&other, 0..count);
-        let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
-        let parts = held_out.errors(&shown, &other, |difference| share * difference.length_squared());
-        Ok(Errors { parts, rays })
-    }
-
-    /// The same with an estimator that isn't the one that is meant: what it differs by from the other mesh, without what is that mesh's own error.
-    fn errors_of_another(
-        &self,
-        settings: &Settings,
-        meant: Estimator,
-        held_out: &mut HeldOut,
-        meshes: &mut LightMeshes,
-        stats: &mut RenderStats,
-    ) -> Result<Errors, RenderError> {
         let mut as_meant = settings.clone();
         as_meant.shading.estimator = meant;
         let (right, count) = self.shaded_by_mesh(&as_meant, held_out, meshes, stats)?;
-        let (shown, _) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
         let other = ReferenceIntegrator::of_shifted_mesh(self.world, &as_meant, SHIFT)?;
         let (other, rays) = held_out.shaded(&other, 0..count);
+        let errors = |shown: &Pixels, share: f32| {
+            held_out.errors(shown, &other, |difference| share * difference.length_squared())
+        };
+        if settings.shading.estimator == meant {
+            let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
+            return Ok(Errors { parts: errors(&right, share), rays });
+        }
+        // Of another estimator, what it differs by from the other mesh, without what is that mesh's own error.
+        let own = errors(&right, 0.5);
+        let (shown, _) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
         let mut parts = held_out.errors(&shown, &other, |difference| difference.length_squared());
-        let own = held_out.errors(&right, &other, |difference| 0.5 * difference.length_squared());
         parts.iter_mut().zip(&own).for_each(|(part, own)| part.wrong -= own.wrong);
         Ok(Errors { parts, rays })
     }

@@ -3,7 +3,7 @@
 mod averaged;
 mod traced;
 
-use super::accuracy::{Accuracy, Ending};
+use super::accuracy::{Accuracy, Ending, ErrorEstimate};
 use super::error::RenderError;
 use super::fixed::View;
 use super::meshes::LightMeshes;
@@ -36,6 +36,17 @@ impl<A: Accel> View<'_, A> {
             self.render_traced(settings.clone(), asked, meshes)
         } else {
             self.render_averaged(settings.clone(), asked, meshes)
+        }
+    }
+
+    /// What was found of a picture that is finished, or that there was no time to find it: the picture is kept all the same.
+    fn or_unmeasured(
+        &self,
+        found: Result<Option<ErrorEstimate>, RenderError>,
+    ) -> Result<(Option<ErrorEstimate>, bool), RenderError> {
+        match found {
+            Err(RenderError::Stopped) if self.stop.is_late() => Ok((None, true)),
+            found => Ok((found?, false)),
         }
     }
 
