@@ -10,7 +10,8 @@ use crate::bench::BenchError;
 use crate::crosscheck::RayTextError;
 use crate::image::ImageError;
 use crate::image::metrics::MetricsError;
-use crate::render::{RenderError, SessionError};
+use crate::light_mesh::file::MeshFileError;
+use crate::render::{RenderError, SessionError, WriteMeshesError};
 use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
 
@@ -84,6 +85,27 @@ pub enum CommandError {
         /// Those that exist.
         names: String,
     },
+    /// A part of an image that there is not.
+    #[error("the image has {width}×{height} pixels: {problem}")]
+    Region {
+        /// Its columns.
+        width: u32,
+        /// Its rows.
+        height: u32,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A light mesh can't be used.
+    #[error("{}", file.display())]
+    LightMesh {
+        /// Its file.
+        file: PathBuf,
+        /// Why.
+        source: MeshFileError,
+    },
+    /// A light mesh can't be written.
+    #[error(transparent)]
+    WriteLightMesh(#[from] WriteMeshesError),
     /// Threads can't be started.
     #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -163,6 +185,18 @@ pub enum CommandError {
     /// The result can't be printed.
     #[error("cannot print the result")]
     Print(#[from] io::Error),
+}
+
+impl CommandError {
+    /// The exit code of the program: 3 if a light mesh belongs to another scene or other settings, which a script may answer by baking it again.
+    pub(super) fn exit_code(&self) -> ExitCode {
+        let mismatch = match self {
+            Self::LightMesh { source, .. } => source.is_mismatch(),
+            Self::WriteLightMesh(WriteMeshesError::File { source, .. }) => source.is_mismatch(),
+            _ => false,
+        };
+        ExitCode::from(if mismatch { 3 } else { 1 })
+    }
 }
 
 /// An error and its causes in one line: `a: b: c`.

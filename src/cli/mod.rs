@@ -1,5 +1,6 @@
 //! The program's command line: one file per subcommand.
 
+mod bake;
 mod bench;
 mod choice;
 pub mod compare;
@@ -9,10 +10,13 @@ pub mod gallery;
 mod generate;
 mod info;
 mod init;
+mod light_mesh;
 mod overrides;
 mod parse;
 mod partial;
 mod progress;
+mod ready;
+mod region;
 mod render;
 mod shared;
 mod stats_file;
@@ -37,6 +41,8 @@ struct Cli {
 enum Command {
     /// Render a scene file to an image.
     Render(Box<render::RenderArgs>),
+    /// Evaluate a scene's light mesh and keep it in a file, for any number of renders.
+    Bake(Box<bake::BakeArgs>),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -67,6 +73,7 @@ impl Command {
     fn run(&self, out: &mut dyn Write) -> Result<Outcome, CommandError> {
         match self {
             Self::Render(args) => render::run(args),
+            Self::Bake(args) => bake::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),
@@ -83,7 +90,7 @@ const USAGE: u8 = 2;
 
 /// Runs the program: parses the command line, runs the subcommand, reports an error once.
 ///
-/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
+/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage, 3 for a light mesh of another scene.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse().and_then(Cli::checked) {
         Ok(cli) => cli,
@@ -102,7 +109,7 @@ pub fn main() -> ExitCode {
         Ok(outcome) => outcome.into(),
         Err(error) => {
             let _ = writeln!(io::stderr(), "lightmesh: {}", describe(&error));
-            ExitCode::FAILURE
+            error.exit_code()
         }
     }
 }

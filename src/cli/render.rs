@@ -6,17 +6,18 @@ use std::time::Instant;
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::light_mesh::LightMeshArgs;
 use super::overrides::Overrides;
 use super::partial::PartialPictures;
+use super::ready::{ReadyScene, camera_of, ready_scene};
+use super::region::RegionArgs;
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
-use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
+use super::stats_file::{BackendStats, StatsFile, peak_rss_bytes};
 use crate::accel::{Accel, Backend};
-use crate::framing::choose_view;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
 use crate::image::{exr::SampleType, tone::auto_exposure};
-use crate::render::{RenderStats, Session, StopToken};
-use crate::scene::load::{LoadedScene, OpenedScene};
-use crate::settings::{Limits, Settings};
+use crate::render::{RenderStats, StopToken};
+use crate::settings::Settings;
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
@@ -47,6 +48,10 @@ pub struct RenderArgs {
     #[arg(long)]
     pub write_partial: bool,
     #[command(flatten)]
+    pub region: RegionArgs,
+    #[command(flatten)]
+    pub light_mesh: LightMeshArgs,
+    #[command(flatten)]
     pub overrides: Overrides,
 }
 
@@ -68,46 +73,14 @@ fn render_to(
 ) -> Result<(), CommandError> {
     let start = Instant::now();
     let reporter = args.quiet.reporter();
-    let mut seconds = Seconds::default();
-
-    let mut opened = args.scene.open(&reporter)?;
-    args.overrides.apply(&mut opened.loaded.settings);
-    opened.loaded.settings.limits.max_error.get_or_insert(Limits::USUAL_ERROR);
-    seconds.load = start.elapsed().as_secs_f64();
-
-    let stage = Instant::now();
-    let spinner = reporter.spinner("building");
-    let choice = args.backend.backend;
-    args.memory.check(&args.scene, &opened.loaded.scene, &[choice])?;
-    let chosen = Backend::build(choice, &opened.loaded.scene)?;
-    spinner.finish_and_clear();
-    if let Some(notice) = &chosen.notice {
-        reporter.line(&format!("note: {notice}"));
-    }
-    seconds.build = stage.elapsed().as_secs_f64();
-
-    let stage = Instant::now();
-    let view = choose_view(&opened, &chosen.backend);
-    let OpenedScene { loaded, choices, bare } = view.complete(opened);
-    let LoadedScene { scene, cameras, mut settings, .. } = loaded;
-    for choice in &choices {
-        reporter.line(&format!("note: {choice}"));
-    }
-    let camera = match &args.camera {
-        None => cameras.first(),
-        Some(name) => cameras.iter().find(|camera| camera.name == *name),
-    }
-    .ok_or_else(|| CommandError::NoSuchCamera {
-        scene: args.scene.path.clone(),
-        name: args.camera.clone().unwrap_or_default(),
-        names: cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", "),
-    })?;
-    seconds.view = stage.elapsed().as_secs_f64();
-
-    let mut session = Session::with_backend(scene, chosen.backend)
-        .map_err(|source| CommandError::Session { scene: args.scene.path.clone(), source })?;
-    let bar = reporter.bar("rendering");
+    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
+    let ReadyScene { mut session, cameras, mut settings, bare, mut seconds } = ready;
+    let camera = camera_of(&args.scene, &cameras, args.camera.as_deref())?;
     let (width, height) = settings.view.resolution;
+    settings.view.crop = args.region.window((width, height))?;
+    args.light_mesh.read(&mut session, &settings, &reporter)?;
+
+    let bar = reporter.bar("rendering");
     bar.set(0, u64::from(width) * u64::from(height));
     let sample_type = if args.float { SampleType::Float } else { SampleType::Half };
     // What a bare model's exposure is, its picture says.
@@ -151,6 +124,7 @@ fn render_to(
     for target in targets {
         target.write(&image, &options)?;
     }
+    args.light_mesh.update(&session, &settings)?;
     seconds.write = stage.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
 

@@ -70,9 +70,25 @@ impl OutputFile {
     ///
     /// If that fails; then the file is as it was before, and no temporary file is left.
     pub fn write(&self, bytes: &[u8]) -> Result<(), ImageError> {
+        self.replace(bytes, false)
+    }
+
+    /// The same, and waits until the bytes are on the disk, so that not even a loss of power loses both what was there and what was written.
+    ///
+    /// # Errors
+    ///
+    /// As for [`OutputFile::write`].
+    pub fn write_durably(&self, bytes: &[u8]) -> Result<(), ImageError> {
+        self.replace(bytes, true)
+    }
+
+    fn replace(&self, bytes: &[u8], durably: bool) -> Result<(), ImageError> {
         let write = || {
             let mut temporary = self.create_temporary()?;
             temporary.write_all(bytes)?;
+            if durably {
+                temporary.as_file().sync_all()?;
+            }
             temporary.persist(&self.resolved)?;
             Ok(())
         };

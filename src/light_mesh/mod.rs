@@ -27,6 +27,7 @@
 
 pub mod direct;
 mod direct_light;
+pub mod file;
 pub mod indirect;
 pub(crate) mod leaks;
 pub mod lookup;

@@ -3,6 +3,7 @@
 mod alpha_mask;
 mod camera;
 mod camera_rays;
+mod fingerprint;
 pub mod generate;
 mod lamps;
 mod light;
@@ -19,6 +20,7 @@ mod validate;
 pub use alpha_mask::AlphaMask;
 pub use camera::{Camera, CameraError, PixelFootprint};
 pub use camera_rays::CameraRays;
+pub use fingerprint::{Fingerprint, SceneFingerprint};
 pub use light::{Falloff, Light, LightKind};
 pub(crate) use masked_mesh::{AlphaMasks, MaskedMesh};
 pub use material::Material;

@@ -6,9 +6,11 @@ mod estimators;
 mod field;
 mod mesh;
 mod refine;
+mod saved;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod spherical_harmonics;
+mod stored_bits;
 mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;

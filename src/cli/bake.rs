@@ -1,0 +1,120 @@
+//! `lightmesh bake`: a scene's light mesh as a file.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::error::{CommandError, Outcome};
+use super::overrides::Overrides;
+use super::parse;
+use super::ready::{ReadyScene, camera_of, ready_scene};
+use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
+use crate::Bounds;
+use crate::image::OutputFile;
+use crate::light_mesh::file::MeshFileError;
+use crate::render::StopToken;
+
+/// What `bake` takes.
+#[derive(Args, Debug)]
+pub struct BakeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Light mesh to write; one that is there and belongs to the scene is added to
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Camera whose view is made known, by name; may be given several times; all cameras of the scene if nothing else is asked for
+    #[arg(long, value_name = "NAME")]
+    camera: Vec<String>,
+    /// Evaluate all mesh points of direct light in the whole scene
+    #[arg(long)]
+    whole: bool,
+    /// Evaluate all mesh points of direct light in a box, given by two corners; may be given several times
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse::bounds)]
+    boxes: Vec<Bounds>,
+    #[command(flatten)]
+    quiet: QuietArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+/// Writes the light mesh.
+///
+/// # Errors
+/// See [`CommandError`]; then the file is as it was.
+pub fn run(args: &BakeArgs) -> Result<Outcome, CommandError> {
+    OutputFile::new(&args.output)?;
+    args.threads.pool()?.install(|| bake(args))?;
+    Ok(Outcome::Passed)
+}
+
+fn bake(args: &BakeArgs) -> Result<(), CommandError> {
+    let start = Instant::now();
+    let reporter = args.quiet.reporter();
+    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
+    let ReadyScene { mut session, cameras, settings, .. } = ready;
+    let failed = |source| CommandError::Render { scene: args.scene.path.clone(), source };
+    match session.read_light_meshes(&args.output, &settings) {
+        Err(MeshFileError::Read(error)) if error.kind() == std::io::ErrorKind::NotFound => {}
+        read => {
+            read.map_err(|source| CommandError::LightMesh { file: args.output.clone(), source })?;
+        }
+    }
+    let named = args.camera.iter().map(|name| camera_of(&args.scene, &cameras, Some(name)));
+    let mut views = named.collect::<Result<Vec<_>, _>>()?;
+    let mut boxes = args.boxes.clone();
+    if args.whole {
+        boxes.push(session.scene().bounds());
+    }
+    if views.is_empty() && boxes.is_empty() {
+        views.extend(&cameras);
+    }
+    let stop = StopToken::default();
+    let (mut evaluated, mut rays) = (0, 0);
+    let (width, height) = settings.view.resolution;
+    for camera in views {
+        let bar = reporter.bar("baking");
+        bar.set(0, u64::from(width) * u64::from(height));
+        let stats = session.prepare(camera, &settings, &bar, &stop).map_err(failed)?;
+        bar.finish();
+        evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
+        rays += stats.rays.shadow + stats.rays.indirect;
+    }
+    let eye = camera_of(&args.scene, &cameras, None)?;
+    for bounds in boxes {
+        let spinner = reporter.spinner("baking");
+        let evaluation = session.prepare_box(bounds, eye, &settings, &stop).map_err(failed)?;
+        spinner.finish_and_clear();
+        evaluated += evaluation.evaluated;
+        rays += evaluation.shadow;
+    }
+    let bytes = session.update_light_meshes(&args.output, &settings)?;
+    reporter.line(&format!(
+        "{}: {evaluated} points evaluated with {rays} rays in {:.2} s, {:.1} MB",
+        args.output.display(),
+        start.elapsed().as_secs_f64(),
+        bytes as f64 / 1e6
+    ));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// Corners may be given in any order.
+    #[test]
+    fn boxes_have_two_corners() {
+        let bounds = parse::bounds("1,2,3,0,5,-1").unwrap();
+        assert_eq!((bounds.min, bounds.max), (Vec3::new(0.0, 2.0, -1.0), Vec3::new(1.0, 5.0, 3.0)));
+        assert!(parse::bounds("1,2,3").is_err() && parse::bounds("1,2,3,4,5,x").is_err());
+    }
+}
