@@ -9,6 +9,7 @@ use crate::accel::{BackendError, MemoryLimitError};
 use crate::bench::BenchError;
 use crate::crosscheck::RayTextError;
 use crate::image::ImageError;
+use crate::image::exr::MergeError;
 use crate::image::metrics::MetricsError;
 use crate::light_mesh::file::MeshFileError;
 use crate::render::{RenderError, SessionError, WriteMeshesError};
@@ -85,6 +86,17 @@ pub enum CommandError {
         /// Those that exist.
         names: String,
     },
+    /// A signal ended the work; `kept` says what is not lost.
+    #[error("interrupted: {kept}")]
+    Interrupted {
+        /// The exit code that belongs to the signal.
+        exit_code: u8,
+        /// What was kept, and how to go on.
+        kept: String,
+    },
+    /// Signals can't be caught.
+    #[error("cannot catch signals")]
+    Signals(#[source] io::Error),
     /// A part of an image that there is not.
     #[error("the image has {width}×{height} pixels: {problem}")]
     Region {
@@ -94,6 +106,14 @@ pub enum CommandError {
         height: u32,
         /// What is wrong.
         problem: String,
+    },
+    /// Parts of an image don't make it.
+    #[error("{}", file.display())]
+    Merge {
+        /// The part that doesn't belong to it, or the image.
+        file: PathBuf,
+        /// Why.
+        source: MergeError,
     },
     /// A light mesh can't be used.
     #[error("{}", file.display())]
@@ -188,9 +208,10 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// The exit code of the program: 3 if a light mesh belongs to another scene or other settings, which a script may answer by baking it again.
+    /// The exit code of the program: that of the signal that ended it, or 3 if a light mesh belongs to another scene or other settings, which a script may answer by baking it again.
     pub(super) fn exit_code(&self) -> ExitCode {
         let mismatch = match self {
+            Self::Interrupted { exit_code, .. } => return ExitCode::from(*exit_code),
             Self::LightMesh { source, .. } => source.is_mismatch(),
             Self::WriteLightMesh(WriteMeshesError::File { source, .. }) => source.is_mismatch(),
             _ => false,

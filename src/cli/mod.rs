@@ -10,7 +10,9 @@ pub mod gallery;
 mod generate;
 mod info;
 mod init;
+mod interrupt;
 mod light_mesh;
+mod merge;
 mod overrides;
 mod parse;
 mod partial;
@@ -18,8 +20,11 @@ mod progress;
 mod ready;
 mod region;
 mod render;
+mod resume;
 mod shared;
+mod sinks;
 mod stats_file;
+mod written;
 
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
@@ -43,6 +48,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Evaluate a scene's light mesh and keep it in a file, for any number of renders.
     Bake(Box<bake::BakeArgs>),
+    /// Put parts of an image together that `render --tile` or `--crop` wrote.
+    Merge(merge::MergeArgs),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -74,6 +81,7 @@ impl Command {
         match self {
             Self::Render(args) => render::run(args),
             Self::Bake(args) => bake::run(args),
+            Self::Merge(args) => merge::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),
@@ -90,7 +98,7 @@ const USAGE: u8 = 2;
 
 /// Runs the program: parses the command line, runs the subcommand, reports an error once.
 ///
-/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage, 3 for a light mesh of another scene.
+/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage, 3 for a light mesh of another scene, 130 or 143 for Ctrl-C or SIGTERM.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse().and_then(Cli::checked) {
         Ok(cli) => cli,

@@ -6,18 +6,23 @@ use std::time::Instant;
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::interrupt::Interrupt;
 use super::light_mesh::LightMeshArgs;
 use super::overrides::Overrides;
 use super::partial::PartialPictures;
+use super::progress::Reporter;
 use super::ready::{ReadyScene, camera_of, ready_scene};
 use super::region::RegionArgs;
+use super::resume::{ResumableTiles, Resumed};
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
-use super::stats_file::{BackendStats, StatsFile, peak_rss_bytes};
-use crate::accel::{Accel, Backend};
+use super::sinks::Sinks;
+use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
+use super::written::{Written, is_written};
+use crate::accel::Accel;
 use crate::image::output::{ImageOptions, OutputFile, OutputTarget};
-use crate::image::{exr::SampleType, tone::auto_exposure};
-use crate::render::{RenderStats, StopToken};
-use crate::settings::Settings;
+use crate::image::{Image, exr::SampleType, tone::auto_exposure};
+use crate::render::{RenderError, RenderStats};
+use crate::scene::Camera;
 
 /// What `render` takes. Flags override the scene file.
 #[derive(Debug, Default, Args)]
@@ -47,6 +52,9 @@ pub struct RenderArgs {
     /// Write the images after every step, not only after the last one
     #[arg(long)]
     pub write_partial: bool,
+    /// Go on where an interrupted render of the same image ended, and leave an image alone that is finished
+    #[arg(long)]
+    pub resume: bool,
     #[command(flatten)]
     pub region: RegionArgs,
     #[command(flatten)]
@@ -73,25 +81,18 @@ fn render_to(
 ) -> Result<(), CommandError> {
     let start = Instant::now();
     let reporter = args.quiet.reporter();
-    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
-    let ReadyScene { mut session, cameras, mut settings, bare, mut seconds } = ready;
-    let camera = camera_of(&args.scene, &cameras, args.camera.as_deref())?;
-    let (width, height) = settings.view.resolution;
-    settings.view.crop = args.region.window((width, height))?;
-    args.light_mesh.read(&mut session, &settings, &reporter)?;
+    let mut ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
+    ready.settings.view.crop = args.region.window(ready.settings.view.resolution)?;
+    args.light_mesh.read(&mut ready.session, &ready.settings, &reporter)?;
+    let camera = camera_of(&args.scene, &ready.cameras, args.camera.as_deref())?.clone();
 
-    let bar = reporter.bar("rendering");
-    bar.set(0, u64::from(width) * u64::from(height));
-    let sample_type = if args.float { SampleType::Float } else { SampleType::Half };
-    // What a bare model's exposure is, its picture says.
-    let exposure = (!bare || args.overrides.exposure.is_some()).then_some(settings.output.exposure);
-    let partial =
-        PartialPictures::new(&bar, if args.write_partial { targets } else { &[] }, sample_type, exposure);
-    let rendered = session.render_to(camera, &settings, &partial, &StopToken::default());
-    partial.finish()?;
-    let (image, stats) =
-        rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;
-    bar.finish();
+    let written = Written::of(&ready.session, &camera, &ready.settings);
+    if args.resume && targets.iter().all(|target| is_written(target.path(), &written)) {
+        reporter.line("note: the image is finished, and stays as it is");
+        return Ok(());
+    }
+    let (image, stats) = render_view(args, &mut ready, &camera, targets, &written, &reporter)?;
+    let ReadyScene { session, settings, bare, mut seconds, .. } = ready;
     if let Some(choice) = &stats.choice {
         reporter.line(&format!("note: {choice}"));
     }
@@ -107,27 +108,32 @@ fn render_to(
     seconds.check = stats.seconds.check;
 
     let stage = Instant::now();
+    let mut exposure = settings.output.exposure;
     if bare && args.overrides.exposure.is_none() {
-        settings.output.exposure = auto_exposure(image.pixels());
-        reporter.line(&format!("note: exposure {:+} stops", settings.output.exposure));
+        let shown = settings.view.crop.and_then(|crop| image.crop(crop));
+        exposure = auto_exposure(shown.as_ref().unwrap_or(&image).pixels());
+        reporter.line(&format!("note: exposure {exposure:+} stops"));
     }
     let non_finite_pixels = image.non_finite_pixels();
     if non_finite_pixels > 0 {
         reporter.line(&format!("warning: {non_finite_pixels} pixels are not finite"));
     }
-    let (scene, backend) = (session.scene(), session.backend());
     let options = ImageOptions {
-        sample_type,
-        exposure: settings.output.exposure,
-        metadata: metadata(backend, &settings, &stats),
+        sample_type: sample_type(args),
+        exposure,
+        window: settings.view.crop,
+        metadata: written.metadata(exposure, &stats),
     };
     for target in targets {
         target.write(&image, &options)?;
     }
+    remove_partial(targets, &written);
     args.light_mesh.update(&session, &settings)?;
     seconds.write = stage.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
 
+    let (scene, backend) = (session.scene(), session.backend());
+    let (width, height) = settings.view.resolution;
     let stats_file = StatsFile {
         version: env!("CARGO_PKG_VERSION"),
         backend: BackendStats { name: backend.name(), version: backend.version() },
@@ -159,20 +165,71 @@ fn render_to(
     Ok(())
 }
 
-/// What is stored in the image: nothing that differs from run to run.
-fn metadata(backend: &Backend, settings: &Settings, stats: &RenderStats) -> Vec<(String, String)> {
-    let entry = |key: &str, value: String| (key.to_owned(), value);
-    vec![
-        entry("Software", format!("lightmesh {}", env!("CARGO_PKG_VERSION"))),
-        entry("lightmesh:backend", backend.to_string()),
-        entry("lightmesh:settings", format!("{settings:?}")),
-        entry("lightmesh:shadow_rays", stats.rays.shadow.to_string()),
-    ]
+/// Renders a view; a signal ends that, and keeps what is done.
+fn render_view(
+    args: &RenderArgs,
+    ready: &mut ReadyScene,
+    camera: &Camera,
+    targets: &[OutputTarget],
+    written: &Written,
+    reporter: &Reporter,
+) -> Result<(Image, RenderStats), CommandError> {
+    let ReadyScene { session, settings, bare, .. } = ready;
+    let partial_file = targets.first().map(|target| ResumableTiles::path(target.path()));
+    let mut tiles = ResumableTiles::new(written.render);
+    if let Some(path) = partial_file.as_deref().filter(|_| args.resume) {
+        match tiles.read(path) {
+            Ok(Resumed::Nothing) => {}
+            Ok(Resumed::Tiles(count)) => reporter.line(&format!("note: {count} tiles are done already")),
+            Ok(Resumed::Other) => {
+                reporter.line(&format!("note: {} is of another render", path.display()));
+            }
+            Err(source) => return Err(CommandError::LightMesh { file: path.to_path_buf(), source }),
+        }
+    }
+    // What a bare model's exposure is, its picture says.
+    let exposure = (!*bare || args.overrides.exposure.is_some()).then_some(settings.output.exposure);
+    let partial_targets = if args.write_partial { targets } else { &[] };
+    let partial = PartialPictures::new(partial_targets, sample_type(args), settings.view.crop, exposure);
+    let bar = reporter.bar("rendering");
+    let (width, height) = settings.view.resolution;
+    bar.set(0, u64::from(width) * u64::from(height));
+    let sinks = Sinks(vec![&bar, &partial, &tiles]);
+    let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
+    let rendered = session.render_to(camera, settings, &sinks, &interrupt.stop);
+    drop(sinks);
+    bar.finish();
+    if let (Err(RenderError::Stopped), Some(exit_code)) = (&rendered, interrupt.exit_code()) {
+        args.light_mesh.update(session, settings)?;
+        let kept = match &partial_file {
+            Some(path) => format!(
+                "{} tiles are kept in {}; the same command with --resume goes on",
+                tiles.write(path)?,
+                path.display()
+            ),
+            None => "nothing was kept".to_owned(),
+        };
+        return Err(CommandError::Interrupted { exit_code, kept });
+    }
+    partial.finish()?;
+    rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })
+}
+
+fn sample_type(args: &RenderArgs) -> SampleType {
+    if args.float { SampleType::Float } else { SampleType::Half }
+}
+
+/// Removes the tiles of an image that is finished; who can't remove them can leave them.
+fn remove_partial(targets: &[OutputTarget], written: &Written) {
+    let Some(path) = targets.first().map(|target| ResumableTiles::path(target.path())) else { return };
+    if matches!(ResumableTiles::new(written.render).read(&path), Ok(Resumed::Tiles(_))) {
+        let _ = std::fs::remove_file(path);
+    }
 }
 
 /// One line on what was done.
 fn summary(stats: &StatsFile) -> String {
-    let seconds = &stats.seconds;
+    let seconds: &Seconds = &stats.seconds;
     let mut line = format!(
         "{} triangles, {} lights, {}×{} in {:.2} s ({} {}, {} threads; load {:.2}, build {:.2}, paths {:.2}, mesh {:.2}, \
          shade {:.2}, check {:.2}); {} shadow rays",

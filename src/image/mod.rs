@@ -13,7 +13,7 @@ mod window;
 
 pub use error::{DecodeError, ImageError};
 pub use image::{Image, MAX_PIXELS};
-pub use input::{decode, read};
+pub use input::{decode, metadata, read};
 pub use output::{ImageFormat, ImageOptions, OutputFile, OutputTarget};
 pub use window::Window;
 

@@ -51,7 +51,7 @@ impl Window {
         if number == 0 || number > count {
             return None;
         }
-        let ways = (1..=count.min(squares.0)).filter(|columns| count % columns == 0);
+        let ways = (1..=count.min(squares.0)).filter(|columns| count.is_multiple_of(*columns));
         let fitting = ways.map(|columns| (columns, count / columns)).filter(|(_, rows)| *rows <= squares.1);
         let elongation = |&(columns, rows): &(u32, u32)| {
             let (wide, high) = (u64::from(width) * u64::from(rows), u64::from(height) * u64::from(columns));

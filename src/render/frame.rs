@@ -1,5 +1,6 @@
 //! The stages of a frame, one after the other for each block of tiles: trace → need → evaluate → shade → film (method §9).
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -30,7 +31,7 @@ pub trait BlockIntegrator: Sync {
 /// Stops a render between two tiles. Clones stop the same renders.
 #[derive(Clone, Debug, Default)]
 pub struct StopToken {
-    stopped: std::sync::Arc<AtomicBool>,
+    stopped: Arc<AtomicBool>,
     /// When a render stops by itself.
     deadline: Option<Instant>,
 }
@@ -39,6 +40,11 @@ impl StopToken {
     /// Stops the renders that were given this token or a clone of it.
     pub fn stop(&self) {
         self.stopped.store(true, Ordering::Relaxed);
+    }
+
+    /// What stops the renders when it is set, for signal handlers.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        self.stopped.clone()
     }
 
     /// Whether [`StopToken::stop`] was called, or a deadline has passed.

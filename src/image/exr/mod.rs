@@ -2,6 +2,7 @@
 
 mod blocks;
 mod channels;
+mod merge;
 mod read;
 mod read_channels;
 mod write;
@@ -11,9 +12,10 @@ use ::exr::meta::attribute::Chromaticities;
 
 pub use ::exr::prelude::f16;
 pub use channels::{Channel, ChannelImage, Samples, Window};
+pub use merge::{MergeError, merge};
 pub use read::decode;
-pub use read_channels::decode_channels;
-pub use write::{encode, encode_channels};
+pub use read_channels::{decode_channels, metadata};
+pub use write::{encode, encode_channels, encode_part};
 
 /// First bytes of every EXR file.
 pub(crate) const SIGNATURE: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];

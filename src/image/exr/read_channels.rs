@@ -78,6 +78,12 @@ fn utf8(text: &Text) -> String {
     String::from_utf8_lossy(text.as_slice()).into_owned()
 }
 
+/// String attributes of a file's first part, in the order of their names; none if it is damaged.
+pub fn metadata(bytes: &[u8]) -> Vec<(String, String)> {
+    let found = without_panic(|| Ok(open(bytes)?.headers().first().map(texts)));
+    found.ok().flatten().unwrap_or_default()
+}
+
 /// String attributes.
 fn texts(header: &Header) -> Vec<(String, String)> {
     let own = &header.own_attributes;

@@ -11,7 +11,7 @@ use ::exr::meta::header::{ImageAttributes, LayerAttributes};
 use ::exr::prelude::{Blocks, Compression, LineOrder};
 
 use super::{BT_709, Channel, ChannelImage, SampleType, Samples, Window};
-use crate::image::Image;
+use crate::image::{self, Image};
 
 /// Encodes `image` as one layer with the channels R, G, B, compressed with ZIP in blocks of 16 rows.
 ///
@@ -22,9 +22,27 @@ use crate::image::Image;
 /// If a metadata key is no valid attribute name.
 pub fn encode(image: &Image, sample_type: SampleType, metadata: &[(String, String)]) -> Result<Vec<u8>> {
     let display = (image.width(), image.height());
-    let mut file = ChannelImage::new(display, Window::of_display(display));
+    encode_part(image, display, image::Window::whole(display), sample_type, metadata)
+}
+
+/// The same for a part of a picture whose width and height are `display`: `window` says where it lies.
+///
+/// # Errors
+///
+/// As for [`encode`], or if the part is not as large as its window, or lies beyond the picture.
+pub fn encode_part(
+    part: &Image,
+    display: (u32, u32),
+    window: image::Window,
+    sample_type: SampleType,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>> {
+    let beyond = || Error::Invalid("a part beyond the picture".into());
+    let start = |at: u32| i32::try_from(at).map_err(|_| beyond());
+    let image::Window { x, y, width, height } = window;
+    let mut file = ChannelImage::new(display, Window { x: start(x)?, y: start(y)?, width, height });
     for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
-        let values = image.pixels().iter().map(|pixel| pixel[index]);
+        let values = part.pixels().iter().map(|pixel| pixel[index]);
         file.channels.push(Channel::new(name, Samples::of(sample_type, values)));
     }
     file.metadata = metadata.to_vec();
