@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::interrupt::Interrupt;
 use super::overrides::Overrides;
 use super::parse;
 use super::ready::{ReadyScene, camera_of, ready_scene};
@@ -13,7 +14,8 @@ use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use crate::Bounds;
 use crate::image::OutputFile;
 use crate::light_mesh::file::MeshFileError;
-use crate::render::StopToken;
+use crate::render::{RenderError, Session};
+use crate::settings::Settings;
 
 /// What `bake` takes.
 #[derive(Args, Debug)]
@@ -59,7 +61,6 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     let reporter = args.quiet.reporter();
     let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
     let ReadyScene { mut session, cameras, settings, .. } = ready;
-    let failed = |source| CommandError::Render { scene: args.scene.path.clone(), source };
     match session.read_light_meshes(&args.output, &settings) {
         Err(MeshFileError::Read(error)) if error.kind() == std::io::ErrorKind::NotFound => {}
         read => {
@@ -75,22 +76,26 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     if views.is_empty() && boxes.is_empty() {
         views.extend(&cameras);
     }
-    let stop = StopToken::default();
+    let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
+    let stop = &interrupt.stop;
     let (mut evaluated, mut rays) = (0, 0);
     let (width, height) = settings.view.resolution;
     for camera in views {
         let bar = reporter.bar("baking");
         bar.set(0, u64::from(width) * u64::from(height));
-        let stats = session.prepare(camera, &settings, &bar, &stop).map_err(failed)?;
+        let prepared = session.prepare(camera, &settings, &bar, stop);
         bar.finish();
+        let stats = prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
         evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
         rays += stats.rays.shadow + stats.rays.indirect;
     }
     let eye = camera_of(&args.scene, &cameras, None)?;
     for bounds in boxes {
         let spinner = reporter.spinner("baking");
-        let evaluation = session.prepare_box(bounds, eye, &settings, &stop).map_err(failed)?;
+        let prepared = session.prepare_box(bounds, eye, &settings, stop);
         spinner.finish_and_clear();
+        let evaluation =
+            prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
         evaluated += evaluation.evaluated;
         rays += evaluation.shadow;
     }
@@ -102,6 +107,22 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
         bytes as f64 / 1e6
     ));
     Ok(())
+}
+
+/// Why baking ended; where a signal did that, what is known by then is kept.
+fn stopped(
+    args: &BakeArgs,
+    session: &Session,
+    settings: &Settings,
+    interrupt: &Interrupt,
+    source: RenderError,
+) -> Result<CommandError, CommandError> {
+    let Some(exit_code) = interrupt.exit_code().filter(|_| matches!(source, RenderError::Stopped)) else {
+        return Ok(CommandError::Render { scene: args.scene.path.clone(), source });
+    };
+    session.update_light_meshes(&args.output, settings)?;
+    let kept = format!("{} has what was evaluated; the same command goes on", args.output.display());
+    Ok(CommandError::Interrupted { exit_code, kept })
 }
 
 #[cfg(test)]

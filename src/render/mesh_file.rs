@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::known_view::KnownView;
 use super::meshes::LightMeshes;
+use crate::Bounds;
 use crate::image::{ImageError, OutputFile};
 use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::file::{Differences, MeshFile, MeshFileError, SectionsWriter};
@@ -19,6 +20,7 @@ use crate::settings::Settings;
 
 /// Names of sections.
 const IDENTITY: &str = "identity";
+const LIGHTS: &str = "lights";
 const SURFACE: &str = "surface";
 const VIEWS: &str = "views";
 
@@ -26,6 +28,7 @@ const VIEWS: &str = "views";
 #[derive(Serialize, Deserialize)]
 struct Identity {
     scene: SceneFingerprint,
+    bounds: Bounds,
     /// Whether emissive triangles are among the lights.
     has_emitters: bool,
     /// Of what light from surfaces follows from, if there is any.
@@ -79,6 +82,7 @@ impl LightMeshes {
         let mut writer = SectionsWriter::default();
         let mut identity = Identity {
             scene: SceneFingerprint::of(of.scene),
+            bounds: of.scene.bounds(),
             has_emitters: of.lights.has_emitters(),
             indirect: self.indirect_fingerprint(),
         };
@@ -94,6 +98,7 @@ impl LightMeshes {
             }
         }
         writer.value(IDENTITY, &identity)?;
+        writer.value(LIGHTS, of.lights)?;
         self.direct.save(of.lights, &mut writer)?;
         if let Some(indirect) = &self.indirect {
             indirect.save(&mut writer)?;

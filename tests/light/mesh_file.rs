@@ -259,9 +259,13 @@ fn contents_that_contradict_each_other_are_refused() {
             for section in names {
                 writer.bytes(section, if section == name { contents.clone() } else { bytes(section) });
             }
-            writer.bytes("direct.inside", bytes("direct.inside"));
-            fs::write(&path, writer.finish()).expect("writable");
-            refused += u32::from(session.read_light_meshes(&path, &settings).is_err());
+            for section in ["direct.inside", "lights"] {
+                writer.bytes(section, bytes(section));
+            }
+            // Not in place: the sound one is mapped.
+            let broken = folder.path().join("broken.lmesh");
+            fs::write(&broken, writer.finish()).expect("writable");
+            refused += u32::from(session.read_light_meshes(&broken, &settings).is_err());
         }
     }
     assert_eq!(refused, 6 * 8);
