@@ -11,5 +11,6 @@ mod command_line;
 mod compare;
 mod gallery;
 mod memory;
+mod pipeline;
 mod same_bytes;
 mod views;
