@@ -11,6 +11,13 @@ pub struct Bounds {
     pub max: Vec3,
 }
 
+impl Default for Bounds {
+    /// The empty box.
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Bounds {
     /// The empty box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
@@ -21,6 +28,11 @@ impl Bounds {
             self.min = self.min.min(point);
             self.max = self.max.max(point);
         }
+    }
+
+    /// The smallest box that holds two of them.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Whether it holds no point.

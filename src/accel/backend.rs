@@ -119,6 +119,19 @@ impl Backend {
         }
     }
 
+    /// The acceleration structure of the same backend over a scene in which instances have moved.
+    ///
+    /// # Errors
+    /// As for [`Backend::build`].
+    pub fn rebuild(&self, scene: &Scene) -> Result<Self, BackendError> {
+        Ok(match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(accel) => Self::Embree(accel.rebuild(scene)?),
+            Self::Bvh(accel) => Self::Bvh(Box::new(accel.rebuild(scene)?)),
+            Self::BruteForce(_) => Self::BruteForce(BruteForceAccel::new(scene)),
+        })
+    }
+
     /// Builds every backend that is available: the BVH, then Embree in every version that is installed. Where there is
     /// none, the text is the reason.
     ///

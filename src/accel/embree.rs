@@ -61,6 +61,15 @@ impl EmbreeAccel {
         Self::build_with(&Library::load().map_err(EmbreeError::Library)?, scene)
     }
 
+    /// [`EmbreeAccel::build`] with the library of this one.
+    ///
+    /// # Errors
+    ///
+    /// As for [`EmbreeAccel::build`].
+    pub(super) fn rebuild(&self, scene: &Scene) -> Result<Self, EmbreeError> {
+        Self::build_with(self.scene.device().library(), scene)
+    }
+
     /// [`EmbreeAccel::build`] with the versions of Embree that are installed besides the one that it takes.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ const BEYOND_FACETS: f32 = 1.01;
 const SHORTER: f32 = 1.0 - 1e-4;
 
 /// The part of a lamp that a light stands for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum LampShape {
     /// No size: rays end at the light's position.
     #[default]

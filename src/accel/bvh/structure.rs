@@ -54,6 +54,14 @@ impl BvhAccel {
         Ok(Self { fixed, instances, dispatch, level, largest: largest_coordinate(scene) })
     }
 
+    /// The structure of a scene in which instances have moved, for the same instruction set.
+    ///
+    /// # Errors
+    /// As for [`build`](Self::build).
+    pub(in crate::accel) fn rebuild(&self, scene: &Scene) -> Result<Self, BvhError> {
+        Self::with_level(scene, self.level)
+    }
+
     /// The instruction set that queries use.
     pub fn level(&self) -> SimdLevel {
         self.level

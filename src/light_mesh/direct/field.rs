@@ -16,6 +16,8 @@ use crate::simd::LANES;
 #[derive(Default)]
 pub struct DirectField {
     pub(super) bits: Vec<VisibilityBits>,
+    /// The bits that something moved in front of, by slot and chunk as `bits`; those of points behind its end are all right.
+    pub(super) stale: Vec<VisibilityBits>,
     light: DerivedValues,
     irradiance: DerivedValues,
 }
@@ -87,7 +89,7 @@ impl DirectField {
 
     /// Bytes held.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.bits.capacity() * size_of::<VisibilityBits>()
+        (self.bits.capacity() + self.stale.capacity()) * size_of::<VisibilityBits>()
             + self.light.memory_bytes()
             + self.irradiance.memory_bytes()
     }
