@@ -35,6 +35,15 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// Its eight corners.
+    pub fn corners(self) -> impl Iterator<Item = Vec3> {
+        let Self { min, max } = self;
+        (0..8).map(move |corner| {
+            let choose = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
+            Vec3::new(choose(0), choose(1), choose(2))
+        })
+    }
+
     /// Whether it holds no point.
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()

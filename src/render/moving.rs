@@ -93,11 +93,7 @@ fn world_box(of_mesh: &Bounds, instance: &Instance) -> Bounds {
     if of_mesh.is_empty() {
         return *of_mesh;
     }
-    let Bounds { min, max } = *of_mesh;
-    let corners = (0..8).map(|corner| {
-        let choose = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
-        to_world.transform_point3(glam::Vec3::new(choose(0), choose(1), choose(2)))
-    });
+    let corners = of_mesh.corners().map(|corner| to_world.transform_point3(corner));
     let mut placed = Bounds::EMPTY;
     corners.for_each(|corner| placed = placed.union(Bounds { min: corner, max: corner }));
     placed

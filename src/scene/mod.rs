@@ -1,7 +1,7 @@
 //! The scene: what is rendered. Immutable once loaded.
 
 mod alpha_mask;
-mod animation;
+pub mod animation;
 mod camera;
 mod camera_rays;
 pub mod generate;
@@ -18,7 +18,7 @@ mod texture;
 mod validate;
 
 pub use alpha_mask::AlphaMask;
-pub use animation::Frame;
+pub use animation::{Animation, Frame};
 pub use camera::{Camera, CameraError, PixelFootprint};
 pub use camera_rays::CameraRays;
 pub use light::{Falloff, Light, LightKind};

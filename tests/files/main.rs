@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod animation;
 mod damaged_images;
 mod failed_images;
 mod formats;
