@@ -5,6 +5,7 @@ mod choice;
 pub mod compare;
 mod crosscheck;
 mod error;
+mod frames;
 pub mod gallery;
 mod generate;
 mod info;
