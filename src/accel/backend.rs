@@ -119,17 +119,20 @@ impl Backend {
         }
     }
 
-    /// The acceleration structure of the same backend over a scene in which instances have moved.
+    /// Makes it the acceleration structure of a scene that differs only in where instances stand.
+    ///
+    /// The BVH keeps the trees of meshes, Embree those of placed ones.
     ///
     /// # Errors
-    /// As for [`Backend::build`].
-    pub fn rebuild(&self, scene: &Scene) -> Result<Self, BackendError> {
-        Ok(match self {
+    /// As for [`Backend::build`]; then it is what it was.
+    pub fn rebuild(&mut self, scene: &Scene) -> Result<(), BackendError> {
+        match self {
             #[cfg(feature = "embree")]
-            Self::Embree(accel) => Self::Embree(accel.rebuild(scene)?),
-            Self::Bvh(accel) => Self::Bvh(Box::new(accel.rebuild(scene)?)),
-            Self::BruteForce(_) => Self::BruteForce(BruteForceAccel::new(scene)),
-        })
+            Self::Embree(accel) => accel.rebuild(scene)?,
+            Self::Bvh(accel) => accel.rebuild(scene)?,
+            Self::BruteForce(accel) => *accel = BruteForceAccel::new(scene),
+        }
+        Ok(())
     }
 
     /// Builds every backend that is available: the BVH, then Embree in every version that is installed. Where there is

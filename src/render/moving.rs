@@ -127,14 +127,11 @@ impl Session {
         let bounds_before = self.scene.bounds();
         let mut boxes: Vec<Bounds> = changes.boxes(&self.scene).collect();
         changes.swap(&mut self.scene);
-        if !changes.instances.is_empty() {
-            match self.backend.rebuild(&self.scene) {
-                Ok(backend) => self.backend = backend,
-                Err(error) => {
-                    changes.swap(&mut self.scene);
-                    return Err(error.into());
-                }
-            }
+        if !changes.instances.is_empty()
+            && let Err(error) = self.backend.rebuild(&self.scene)
+        {
+            changes.swap(&mut self.scene);
+            return Err(error.into());
         }
         boxes.extend(changes.boxes(&self.scene));
         let bounds = self.scene.bounds();

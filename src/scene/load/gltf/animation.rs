@@ -11,6 +11,9 @@ use super::nodes::{PlacedNode, local};
 use crate::scene::animation::{Channels, Curve, CurveError, Interpolation, Local, Node, Rig, Turning, Value};
 use crate::scene::load::LoadError;
 
+/// Times and values of all channels together: accessors may be shared, and need not cost the file anything.
+const MOST_VALUES: u64 = 1 << 23;
+
 impl Document<'_> {
     /// The nodes of the scene with all animations of the file, which play together: of several that move one property of a node the first one
     /// counts. Empty for a file without animations.
@@ -23,10 +26,11 @@ impl Document<'_> {
             return Ok(rig);
         }
         let mut channels: HashMap<usize, Channels> = HashMap::new();
+        let mut left = MOST_VALUES;
         for (number, animation) in self.root.animations.iter().enumerate() {
             for channel in 0..animation.channels.len() {
                 let place = format!("animations[{number}].channels[{channel}]");
-                if self.channel(animation, channel, &place, &mut channels)? {
+                if self.channel(animation, channel, &place, &mut channels, &mut left)? {
                     let note = format!("{}: morph targets don't move", self.path.display());
                     rig.notes = vec![note];
                 }
@@ -35,11 +39,16 @@ impl Document<'_> {
         rig.nodes = placed
             .iter()
             .filter_map(|placed| {
-                Some(Node {
-                    parent: placed.parent.map(|parent| parent as u32),
-                    rest: local(self.root.nodes.get(placed.index)?),
-                    channels: channels.remove(&placed.index).unwrap_or_default(),
-                })
+                let channels = channels.remove(&placed.index).unwrap_or_default();
+                let rest = match local(self.root.nodes.get(placed.index)?) {
+                    // Against the rules, but clear.
+                    Local::Matrix(matrix) if !channels.is_empty() => {
+                        let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
+                        Local::Steps { translation, rotation, scale }
+                    }
+                    rest => rest,
+                };
+                Some(Node { parent: placed.parent.map(|parent| parent as u32), rest, channels })
             })
             .collect();
         Ok(rig)
@@ -52,6 +61,7 @@ impl Document<'_> {
         channel: usize,
         place: &str,
         channels: &mut HashMap<usize, Channels>,
+        left: &mut u64,
     ) -> Result<bool, LoadError> {
         let Some(channel) = animation.channels.get(channel) else { return Ok(false) };
         let sampler = channel.sampler.value();
@@ -59,9 +69,9 @@ impl Document<'_> {
             return Err(self.error(place, format!("samplers[{sampler}] does not exist")));
         };
         let node_index = channel.target.node.value();
-        let Some(node) = self.root.nodes.get(node_index) else {
+        if node_index >= self.root.nodes.len() {
             return Err(self.error(place, format!("nodes[{node_index}] does not exist")));
-        };
+        }
         let path = match channel.target.path {
             Checked::Valid(Property::MorphTargetWeights) => return Ok(true),
             Checked::Valid(path) => path,
@@ -71,8 +81,11 @@ impl Document<'_> {
         let Checked::Valid(mode) = sampler.interpolation else {
             return Err(self.error(place, "its interpolation is unknown".to_owned()));
         };
-        if matches!(local(node), Local::Matrix(_)) {
-            return Err(self.error(place, format!("moves nodes[{node_index}], which has a matrix")));
+        for accessor in [sampler.input, sampler.output] {
+            let values = self.accessor_len(accessor.value(), place)?;
+            *left = left.checked_sub(values).ok_or_else(|| {
+                self.error(place, format!("the animations of a file have at most {MOST_VALUES} values"))
+            })?;
         }
         let times = self.floats::<1>(sampler.input.value(), place)?;
         let times: Vec<f64> = times.into_iter().map(|[time]| f64::from(time)).collect();
