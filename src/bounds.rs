@@ -12,6 +12,13 @@ pub struct Bounds {
     pub max: Vec3,
 }
 
+impl Default for Bounds {
+    /// The empty box.
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Bounds {
     /// The empty box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
@@ -22,6 +29,20 @@ impl Bounds {
             self.min = self.min.min(point);
             self.max = self.max.max(point);
         }
+    }
+
+    /// The smallest box that holds two of them.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Its eight corners.
+    pub fn corners(self) -> impl Iterator<Item = Vec3> {
+        let Self { min, max } = self;
+        (0..8).map(move |corner| {
+            let choose = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
+            Vec3::new(choose(0), choose(1), choose(2))
+        })
     }
 
     /// Whether it holds no point.

@@ -119,6 +119,22 @@ impl Backend {
         }
     }
 
+    /// Makes it the acceleration structure of a scene that differs only in where instances stand.
+    ///
+    /// The BVH keeps the trees of meshes, Embree those of placed ones.
+    ///
+    /// # Errors
+    /// As for [`Backend::build`]; then it is what it was.
+    pub fn rebuild(&mut self, scene: &Scene) -> Result<(), BackendError> {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(accel) => accel.rebuild(scene)?,
+            Self::Bvh(accel) => accel.rebuild(scene)?,
+            Self::BruteForce(accel) => *accel = BruteForceAccel::new(scene),
+        }
+        Ok(())
+    }
+
     /// Builds every backend that is available: the BVH, then Embree in every version that is installed. Where there is
     /// none, the text is the reason.
     ///

@@ -48,6 +48,8 @@ pub enum EmbreeError {
 /// are never hit, nor are instances whose transform has no inverse.
 pub struct EmbreeAccel {
     scene: embree_sys::Scene,
+    /// Structures of the placed meshes, by their index.
+    placed: HashMap<u32, embree_sys::Scene>,
 }
 
 impl EmbreeAccel {
@@ -59,6 +61,17 @@ impl EmbreeAccel {
     /// Embree cannot take.
     pub fn build(scene: &Scene) -> Result<Self, EmbreeError> {
         Self::build_with(&Library::load().map_err(EmbreeError::Library)?, scene)
+    }
+
+    /// Makes it the structure of a scene that differs only in where instances stand: meshes that are placed are not built again.
+    ///
+    /// # Errors
+    ///
+    /// As for [`EmbreeAccel::build`]; then it is what it was.
+    pub(super) fn rebuild(&mut self, scene: &Scene) -> Result<(), EmbreeError> {
+        let device = self.scene.device().clone();
+        *self = Self::build_on(&device, scene, self.placed.clone())?;
+        Ok(())
     }
 
     /// [`EmbreeAccel::build`] with the versions of Embree that are installed besides the one that it takes.
@@ -82,8 +95,16 @@ impl EmbreeAccel {
     pub fn build_with(library: &Library, scene: &Scene) -> Result<Self, EmbreeError> {
         let threads = format!("threads={}", rayon::current_num_threads());
         let device = Device::new(library, &threads).map_err(EmbreeError::Library)?;
-        let mut top = SceneBuilder::new(&device).map_err(EmbreeError::Setup)?;
-        let mut placed = HashMap::new();
+        Self::build_on(&device, scene, HashMap::new())
+    }
+
+    /// Builds the acceleration structure; some placed meshes may have theirs already.
+    fn build_on(
+        device: &Device,
+        scene: &Scene,
+        mut placed: HashMap<u32, embree_sys::Scene>,
+    ) -> Result<Self, EmbreeError> {
+        let mut top = SceneBuilder::new(device).map_err(EmbreeError::Setup)?;
         let masks = AlphaMasks::of_scene(scene);
         for (id, instance) in (0..INVALID_ID).zip(&scene.instances) {
             let mesh = scene
@@ -92,12 +113,12 @@ impl EmbreeAccel {
                 .ok_or(EmbreeError::NoSuchMesh { instance: id as usize, mesh: instance.mesh })?;
             let mesh_error = |error| EmbreeError::Mesh { name: mesh.name.clone(), error };
             let geometry = match instance.to_world {
-                None => triangles(&device, mesh, &masks).map_err(mesh_error)?,
+                None => triangles(device, mesh, &masks).map_err(mesh_error)?,
                 Some(to_world) => {
                     let object = match placed.get(&instance.mesh) {
                         Some(object) => object,
                         None => {
-                            let object = object(&device, mesh, &masks).map_err(mesh_error)?;
+                            let object = object(device, mesh, &masks).map_err(mesh_error)?;
                             placed.entry(instance.mesh).or_insert(object)
                         }
                     };
@@ -110,7 +131,7 @@ impl EmbreeAccel {
             };
             top.attach(id, geometry).map_err(mesh_error)?;
         }
-        Ok(Self { scene: top.commit().map_err(EmbreeError::Setup)? })
+        Ok(Self { scene: top.commit().map_err(EmbreeError::Setup)?, placed })
     }
 
     /// Version of the loaded Embree, such as `4.3.3`.

@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::frames::FrameArgs;
 use super::interrupt::Interrupt;
 use super::overrides::Overrides;
 use super::parse;
@@ -15,6 +16,7 @@ use crate::Bounds;
 use crate::image::OutputFile;
 use crate::light_mesh::file::MeshFileError;
 use crate::render::{RenderError, Session};
+use crate::scene::Camera;
 use crate::settings::Settings;
 
 /// What `bake` takes.
@@ -43,6 +45,8 @@ pub struct BakeArgs {
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
+    frames: FrameArgs,
+    #[command(flatten)]
     overrides: Overrides,
 }
 
@@ -59,8 +63,9 @@ pub fn run(args: &BakeArgs) -> Result<Outcome, CommandError> {
 fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     let start = Instant::now();
     let reporter = args.quiet.reporter();
-    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &reporter)?;
-    let ReadyScene { mut session, cameras, settings, .. } = ready;
+    let frames = &args.frames;
+    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, frames, &reporter)?;
+    let ReadyScene { mut session, cameras, animation, settings, .. } = ready;
     match session.read_light_meshes(&args.output, &settings) {
         Err(MeshFileError::Read(error)) if error.kind() == std::io::ErrorKind::NotFound => {}
         read => {
@@ -68,19 +73,32 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
         }
     }
     let named = args.camera.iter().map(|name| camera_of(&args.scene, &cameras, Some(name)));
-    let mut views = named.collect::<Result<Vec<_>, _>>()?;
+    let mut seen = named.collect::<Result<Vec<_>, _>>()?;
     let mut boxes = args.boxes.clone();
     if args.whole {
         boxes.push(session.scene().bounds());
     }
-    if views.is_empty() && boxes.is_empty() {
-        views.extend(&cameras);
+    if seen.is_empty() && boxes.is_empty() {
+        seen.extend(cameras.iter().enumerate());
     }
+    let views: Vec<Camera> = match args.frames.numbers(&animation, &args.scene.path)? {
+        None => seen.into_iter().map(|(_, camera)| camera.clone()).collect(),
+        Some(numbers) => {
+            if animation.moves_scene() {
+                return Err(CommandError::MovingBake { scene: args.scene.path.clone() });
+            }
+            let views = numbers.into_iter().flat_map(|number| {
+                let frame = animation.frame(number);
+                seen.iter().map(move |&(index, still)| frame.camera(index, still)).collect::<Vec<_>>()
+            });
+            views.collect()
+        }
+    };
     let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
     let stop = &interrupt.stop;
     let (mut evaluated, mut rays) = (0, 0);
     let (width, height) = settings.view.resolution;
-    for camera in views {
+    for camera in &views {
         let bar = reporter.bar("baking");
         bar.set(0, u64::from(width) * u64::from(height));
         let prepared = session.prepare(camera, &settings, &bar, stop);
@@ -89,7 +107,7 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
         evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
         rays += stats.rays.shadow + stats.rays.indirect;
     }
-    let eye = camera_of(&args.scene, &cameras, None)?;
+    let (_, eye) = camera_of(&args.scene, &cameras, None)?;
     for bounds in boxes {
         let spinner = reporter.spinner("baking");
         let prepared = session.prepare_box(bounds, eye, &settings, stop);

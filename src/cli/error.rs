@@ -115,6 +115,12 @@ pub enum CommandError {
         /// Why.
         source: MergeError,
     },
+    /// Triangles or lights move, so that frames have no light mesh in common.
+    #[error("{}: more than cameras moves in these frames, which then have no light mesh in common: `render --frames` keeps what it can", scene.display())]
+    MovingBake {
+        /// The scene file.
+        scene: PathBuf,
+    },
     /// A light mesh can't be used.
     #[error("{}", file.display())]
     LightMesh {
@@ -126,6 +132,23 @@ pub enum CommandError {
     /// A light mesh can't be written.
     #[error(transparent)]
     WriteLightMesh(#[from] WriteMeshesError),
+    /// Several frames would be written to one file.
+    #[error("{}: several frames need a place for their number in its name, such as frame.####.exr", .0.display())]
+    FrameName(PathBuf),
+    /// All frames were asked for where there are none.
+    #[error("{}: nothing moves, so that `all` names no frames", scene.display())]
+    NoFrames {
+        /// The scene file.
+        scene: PathBuf,
+    },
+    /// An animation is longer than any that one would render at once.
+    #[error("{}: {count} frames are too many for `all`", scene.display())]
+    TooManyFrames {
+        /// The scene file.
+        scene: PathBuf,
+        /// Number of its frames.
+        count: i64,
+    },
     /// Threads can't be started.
     #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -50,6 +50,11 @@ impl LightMeshArgs {
         Ok(())
     }
 
+    /// Whether the file is to be added to.
+    pub fn updates(&self) -> bool {
+        self.update && self.light_mesh.is_some()
+    }
+
     /// Adds what a session knows to the file, if that was asked for.
     ///
     /// # Errors

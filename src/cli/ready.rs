@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::error::CommandError;
+use super::frames::FrameArgs;
 use super::overrides::Overrides;
 use super::progress::Reporter;
 use super::shared::{BackendArgs, MemoryArgs, SceneArgs};
@@ -10,8 +11,8 @@ use super::stats_file::Seconds;
 use crate::accel::Backend;
 use crate::framing::choose_view;
 use crate::render::Session;
-use crate::scene::Camera;
 use crate::scene::load::{LoadedScene, OpenedScene};
+use crate::scene::{Animation, Camera};
 use crate::settings::{Limits, Settings};
 
 /// A scene that is ready to be rendered.
@@ -20,6 +21,8 @@ pub struct ReadyScene {
     pub session: Session,
     /// Its cameras, at least one.
     pub cameras: Vec<Camera>,
+    /// What moves in it.
+    pub animation: Animation,
     /// Its settings, with those of the command line.
     pub settings: Settings,
     /// Whether it is a model without a scene file.
@@ -37,6 +40,7 @@ pub fn ready_scene(
     backend: BackendArgs,
     memory: MemoryArgs,
     overrides: &Overrides,
+    frames: &FrameArgs,
     reporter: &Reporter,
 ) -> Result<ReadyScene, CommandError> {
     let mut seconds = Seconds::default();
@@ -59,17 +63,18 @@ pub fn ready_scene(
     let stage = Instant::now();
     let view = choose_view(&opened, &chosen.backend);
     let OpenedScene { loaded, choices, bare } = view.complete(opened);
-    let LoadedScene { scene, cameras, settings, .. } = loaded;
+    let LoadedScene { mut scene, cameras, animation, settings, .. } = loaded;
     for choice in &choices {
         reporter.line(&format!("note: {choice}"));
     }
+    frames.prepare(&mut scene, &animation, reporter);
     let session = Session::with_backend(scene, chosen.backend)
         .map_err(|source| CommandError::Session { scene: args.path.clone(), source })?;
     seconds.view = stage.elapsed().as_secs_f64();
-    Ok(ReadyScene { session, cameras, settings, bare, seconds })
+    Ok(ReadyScene { session, cameras, animation, settings, bare, seconds })
 }
 
-/// The camera of a name, or the first one.
+/// The camera of a name, or the first one, with its number.
 ///
 /// # Errors
 /// [`CommandError::NoSuchCamera`].
@@ -77,10 +82,11 @@ pub fn camera_of<'a>(
     args: &SceneArgs,
     cameras: &'a [Camera],
     name: Option<&str>,
-) -> Result<&'a Camera, CommandError> {
+) -> Result<(usize, &'a Camera), CommandError> {
+    let mut numbered = cameras.iter().enumerate();
     let camera = match name {
-        None => cameras.first(),
-        Some(name) => cameras.iter().find(|camera| camera.name == *name),
+        None => numbered.next(),
+        Some(name) => numbered.find(|(_, camera)| camera.name == *name),
     };
     camera.ok_or_else(|| CommandError::NoSuchCamera {
         scene: args.path.clone(),

@@ -65,6 +65,19 @@ impl LightChunk {
         }
     }
 
+    /// The lanes to whose lights rays end elsewhere than to those of another chunk: of the others, what is known of their visibility is known
+    /// of both.
+    pub fn placed_unlike(&self, other: &Self) -> VisibilityBits {
+        let differs = |&lane: &usize| {
+            let place = |chunk: &Self| {
+                let local = chunk.kinds.as_ref().map_or(1.0, |kinds| kinds.local[lane]);
+                (chunk.used >> lane & 1, [0, 1, 2].map(|axis| chunk.position[axis][lane]), local)
+            };
+            place(self) != place(other) || self.lamp(lane) != other.lamp(lane)
+        };
+        (0..LANES).filter(differs).fold(0, |lanes, lane| lanes | 1 << lane)
+    }
+
     /// The way from `x` to the light in `lane`: its end is beyond all that could hide the light.
     #[inline(always)]
     pub fn to_light(&self, lane: usize, x: [f32; 3]) -> [f32; 3] {

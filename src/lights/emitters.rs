@@ -21,7 +21,7 @@ const MOST_CUTS: usize = 4096;
 const FINE: f32 = 1.0 / 512.0;
 
 /// A part of an emissive triangle.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Piece {
     /// A corner, and the ways from it to the other two.
     corner: Vec3,

@@ -22,7 +22,7 @@ const BEYOND_FACETS: f32 = 1.01;
 const SHORTER: f32 = 1.0 - 1e-4;
 
 /// The part of a lamp that a light stands for.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LampShape {
     /// No size: rays end at the light's position.
     #[default]

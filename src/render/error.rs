@@ -15,6 +15,16 @@ pub enum SessionError {
     /// There is no acceleration structure.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// A frame moves what the scene doesn't have.
+    #[error("frame {frame} moves {what} {index}, which does not exist")]
+    NothingToMove {
+        /// Number of the frame.
+        frame: i64,
+        /// An instance or a light.
+        what: &'static str,
+        /// Its index in the scene.
+        index: usize,
+    },
 }
 
 /// Why there is no image.

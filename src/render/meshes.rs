@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::known_view::{KnownView, identity};
+use super::scene_lights::SceneLights;
 use super::stats::RenderStats;
 use crate::Bounds;
-use crate::light_mesh::direct::{DirectInterpolation, DirectMesh};
+use crate::light_mesh::direct::{DirectInterpolation, DirectMesh, KeptBits, Motion};
 use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::light_mesh::points::{AutoSpacing, MeshError};
 use crate::light_mesh::surface::SurfaceMesh;
@@ -244,6 +245,44 @@ impl LightMeshes {
         }
         let identity = identity(camera, settings);
         self.known_views.iter().find(|view| view.identity == identity)
+    }
+
+    /// Forgets what may be otherwise after geometry in some boxes, where it was and where it is, has moved, or lights; `lights` are those before
+    /// and after. Returns what stays known of direct light.
+    pub(super) fn forget_moved(
+        &mut self,
+        bounds: Bounds,
+        boxes: Vec<Bounds>,
+        lights: [&SceneLights; 2],
+    ) -> KeptBits {
+        (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
+        (self.views, self.known_views) = (Vec::new(), Vec::new());
+        let [before, after] = lights.map(|lights| {
+            lights
+                .with_emitters
+                .as_ref()
+                .filter(|_| self.has_emitters)
+                .or((!self.has_emitters).then_some(&lights.plain))
+        });
+        let Some(before) = before else { return KeptBits::default() };
+        let motion = after.and_then(|after| Some((after, Motion::new(boxes, before, after)?)));
+        match motion {
+            Some((after, motion)) if bounds == self.direct.store().points.bounds() => {
+                self.direct.forget_moved(after, &motion)
+            }
+            _ => {
+                let forgotten = self.direct.forget_all(before);
+                *self = Self::new(bounds);
+                forgotten
+            }
+        }
+    }
+
+    /// What is known of direct light, as after something that changes nothing.
+    pub(super) fn all_kept(&self, lights: &SceneLights) -> KeptBits {
+        let points = self.direct.store().positions().len() as u64;
+        let of_mesh = lights.with_emitters.as_ref().filter(|_| self.has_emitters).unwrap_or(&lights.plain);
+        KeptBits { points_kept: points, bits_kept: points * of_mesh.len() as u64, ..KeptBits::default() }
     }
 
     /// Bytes held.

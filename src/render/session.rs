@@ -10,13 +10,14 @@ use super::fixed::View;
 use super::frame::{Purpose, StopToken};
 use super::mesh_file::{MeshScene, RestoredMeshes, WriteMeshesError};
 use super::meshes::LightMeshes;
+use super::scene_lights::SceneLights;
 use super::stats::RenderStats;
 use crate::Bounds;
 use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
 use crate::light_mesh::direct::{Basis, DirectEvaluation, DirectField};
 use crate::light_mesh::file::{MeshFile, MeshFileError};
-use crate::lights::{EmissiveTriangles, PackedLights, emitters};
+use crate::lights::EmissiveTriangles;
 use crate::scene::{Camera, Scene, SceneError};
 use crate::settings::Settings;
 use crate::world::World;
@@ -26,33 +27,11 @@ use crate::world::World;
 /// Light meshes keep what they know from one render to the next: another camera, radius, neighbourhood, estimator or leak rule,
 /// or another intensity of a light, costs only what was never evaluated.
 pub struct Session {
-    scene: Scene,
-    backend: Backend,
-    lights: SceneLights,
-    emissive: EmissiveTriangles,
-    meshes: LightMeshes,
-}
-
-/// The lights of a scene, as integrators take them.
-struct SceneLights {
-    /// Without emissive triangles, whose light comes with that of all other surfaces: the paper's way.
-    plain: PackedLights,
-    /// With those, if there are any, for Lambertian reflectors, which know what radiance is.
-    with_emitters: Option<PackedLights>,
-}
-
-impl SceneLights {
-    fn of(scene: &Scene) -> Self {
-        let emitters = emitters(scene);
-        let with_emitters = (!emitters.is_empty()).then(|| PackedLights::with_emitters(scene, &emitters));
-        Self { plain: PackedLights::of_scene(scene), with_emitters }
-    }
-
-    /// Those that some settings ask for.
-    fn of_settings(&self, settings: &Settings) -> &PackedLights {
-        let with_emitters = self.with_emitters.as_ref().filter(|_| settings.shading.lambertian);
-        with_emitters.unwrap_or(&self.plain)
-    }
+    pub(super) scene: Scene,
+    pub(super) backend: Backend,
+    pub(super) lights: SceneLights,
+    pub(super) emissive: EmissiveTriangles,
+    pub(super) meshes: LightMeshes,
 }
 
 impl Session {

@@ -1,6 +1,6 @@
 //! Pinhole camera.
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 /// Pinhole camera: position, direction and field of view; the resolution is a setting of the render.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,6 +100,16 @@ impl Camera {
     /// The camera with a name.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
+    }
+
+    /// The camera in another place.
+    pub fn moved(&self, to_world: &Affine3A) -> Self {
+        Self {
+            position: to_world.transform_point3(self.position),
+            look_at: to_world.transform_point3(self.look_at),
+            up: to_world.transform_vector3(self.up).normalize_or(self.up),
+            ..self.clone()
+        }
     }
 
     /// Whether the camera shows anything.

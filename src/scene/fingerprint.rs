@@ -76,7 +76,7 @@ fn geometry(scene: &Scene) -> Fingerprint {
             writer.array(mesh.uvs.as_deref().unwrap_or_default());
         }
     }
-    writer.value(&scene.instances);
+    writer.value(&(&scene.instances, scene.bounds()));
     for material in &scene.materials {
         writer.value(&(material.two_sided, material.cull, material.lamp));
         if let Some(mask) = &material.alpha_mask {

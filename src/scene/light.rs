@@ -1,6 +1,6 @@
 //! Light sources and their falloff.
 
-use glam::Vec3;
+use glam::{Affine3A, DMat3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Light i of eq. (1): a point light, or one of the two other kinds that models bring.
@@ -82,6 +82,26 @@ impl Light {
         let [inner_cosine, outer_cosine] = cone.map(|angle| angle.to_radians().cos());
         let direction = unit(direction);
         Self { position, intensity, kind: LightKind::Spot { direction, inner_cosine, outer_cosine } }
+    }
+
+    /// The light in another place; its intensity stays whatever the scale.
+    pub fn moved(&self, to_world: &Affine3A) -> Self {
+        let turned = |direction: Vec3| to_world.transform_vector3(direction).normalize_or(direction);
+        let kind = match self.kind {
+            LightKind::Point => LightKind::Point,
+            LightKind::Ball { radius } => {
+                let Affine3A { matrix3, .. } = to_world;
+                let columns = [matrix3.x_axis, matrix3.y_axis, matrix3.z_axis].map(|axis| axis.as_dvec3());
+                let [x, y, z] = columns;
+                let scale = DMat3::from_cols(x, y, z).determinant().abs().cbrt() as f32;
+                LightKind::Ball { radius: radius * scale }
+            }
+            LightKind::Spot { direction, inner_cosine, outer_cosine } => {
+                LightKind::Spot { direction: turned(direction), inner_cosine, outer_cosine }
+            }
+            LightKind::Directional { direction } => LightKind::Directional { direction: turned(direction) },
+        };
+        Self { position: to_world.transform_point3(self.position), kind, ..*self }
     }
 
     /// A light from infinitely far away that travels along `direction` (any length but 0).

@@ -1,6 +1,7 @@
 //! The scene: what is rendered. Immutable once loaded.
 
 mod alpha_mask;
+pub mod animation;
 mod camera;
 mod camera_rays;
 mod fingerprint;
@@ -18,6 +19,7 @@ mod texture;
 mod validate;
 
 pub use alpha_mask::AlphaMask;
+pub use animation::{Animation, Frame};
 pub use camera::{Camera, CameraError, PixelFootprint};
 pub use camera_rays::CameraRays;
 pub use fingerprint::{Fingerprint, SceneFingerprint};

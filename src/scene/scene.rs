@@ -38,6 +38,9 @@ pub struct Scene {
     pub falloff: Falloff,
     /// Radiance of rays that leave the scene, linear RGB.
     pub background: Vec3,
+    /// Counts as part of the [bounds](Self::bounds), whatever stands in it: what all frames of an animation reach, so that they share the
+    /// places of their mesh points. Empty for a scene that doesn't move.
+    pub extent: Bounds,
 }
 
 impl Scene {
@@ -65,9 +68,9 @@ impl Scene {
         self.instances.push(Instance { mesh, to_world: Some(to_world) });
     }
 
-    /// Box around all triangles in world space.
+    /// Box around all triangles in world space and the [extent](Self::extent).
     pub fn bounds(&self) -> Bounds {
-        let mut bounds = Bounds::EMPTY;
+        let mut bounds = self.extent;
         for instance in &self.instances {
             let mesh = &self.meshes[instance.mesh as usize];
             for &[x, y, z] in mesh.positions.as_slice() {

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{AlphaMask, Falloff, Light, LightKind, Material, Scene, TriangleMaterials, TriangleMesh};
+use crate::Bounds;
 
 /// A scene that contradicts itself, or holds numbers that no light can be computed from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -137,6 +138,11 @@ impl Scene {
             not_negative("falloff constant", constant).map_err(SceneError::Value)?;
         }
         color("background", self.background).map_err(SceneError::Value)?;
+        let extent = self.extent;
+        let rule = "be finite or empty";
+        let holds = extent == Bounds::EMPTY || (extent.min.is_finite() && extent.max.is_finite());
+        check("extent", rule, format!("{} to {}", extent.min, extent.max), holds)
+            .map_err(SceneError::Value)?;
         for (index, mesh) in self.meshes.iter().enumerate() {
             let error = |error| SceneError::Mesh { index, name: mesh.name.clone(), error };
             validate_mesh(mesh, self.materials.len()).map_err(error)?;

@@ -11,7 +11,6 @@ use std::io::Write as _;
 use std::sync::Arc;
 
 use glam::Vec3;
-use lightmesh::World;
 use lightmesh::accel::{Backend, BackendChoice, BvhAccel};
 use lightmesh::image::Image;
 use lightmesh::light_mesh::direct::DirectMesh;
@@ -26,6 +25,7 @@ use lightmesh::scene::{
     TriangleMesh,
 };
 use lightmesh::settings::{Integrator, Settings};
+use lightmesh::{Bounds, World};
 
 /// Triangles by hand, with a material each.
 #[derive(Default)]
@@ -84,6 +84,7 @@ impl Builder {
             lights,
             falloff,
             background: Vec3::ZERO,
+            extent: Bounds::EMPTY,
         }
     }
 }

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod animation;
 mod channels;
 mod damaged_images;
 mod failed_images;

@@ -9,6 +9,7 @@ mod auto;
 mod convergence;
 mod determinism;
 mod estimators;
+mod frames;
 mod furnace;
 mod hybrid;
 mod lamps;

@@ -46,6 +46,7 @@ fn half_plane() -> Scene {
         lights: vec![Light::point(LIGHT, Vec3::ONE)],
         falloff: Falloff::None,
         background: Vec3::ZERO,
+        extent: lightmesh::Bounds::EMPTY,
     }
 }
 

@@ -9,6 +9,7 @@ mod bench;
 mod choice;
 mod command_line;
 mod compare;
+mod frames;
 mod gallery;
 mod memory;
 mod pipeline;

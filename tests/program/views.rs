@@ -4,7 +4,7 @@ use glam::Vec3;
 use lightmesh::accel::{Backend, BackendChoice};
 use lightmesh::framing::choose_view;
 use lightmesh::scene::load::{LoadedScene, OpenedScene, Skipped};
-use lightmesh::scene::{Falloff, LightKind, Material, Scene};
+use lightmesh::scene::{Animation, Falloff, LightKind, Material, Scene};
 use lightmesh::settings::Settings;
 
 use crate::common::{Builder, grey};
@@ -20,6 +20,7 @@ fn viewed_with(builder: Builder, material: Material, choice: BackendChoice) -> L
     let loaded = LoadedScene {
         scene,
         cameras: Vec::new(),
+        animation: Animation::default(),
         settings: Settings::default(),
         skipped: Skipped::default(),
         warnings: Vec::new(),

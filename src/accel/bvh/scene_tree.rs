@@ -25,6 +25,8 @@ pub struct Instances {
     pub placed: Vec<Placed>,
     /// Trees of the instanced meshes.
     pub trees: Vec<Blas>,
+    /// From [`Scene::meshes`] to `trees`.
+    pub tree_of_mesh: HashMap<u32, usize>,
 }
 
 /// An instance with a transform.
@@ -96,57 +98,82 @@ fn corners_of(positions: &[[f32; 3]], corners: &[u32; 3]) -> Option<[[f32; 3]; 3
     Some([a?, b?, c?])
 }
 
-/// Builds both levels.
-pub fn build_scene(scene: &Scene) -> Result<(Blas, Instances), BvhError> {
-    let mesh_of = |index: u32, instance: usize| {
-        scene.meshes.get(index as usize).ok_or(BvhError::NoSuchMesh { instance, mesh: index })
-    };
-    let masks = AlphaMasks::of_scene(scene);
-    let mut fixed: Vec<(u32, &Arc<TriangleMesh>)> = Vec::new();
-    let mut instances = Instances::default();
-    let mut tree_of_mesh = HashMap::new();
-    let mut boxes = Vec::new();
-    if scene.instances.len() >= LEAF as usize {
-        return Err(BvhError::TooManyTriangles);
-    }
-    for (index, instance) in scene.instances.iter().enumerate() {
-        let mesh = mesh_of(instance.mesh, index)?;
-        let Some(to_world) = &instance.to_world else {
-            fixed.push((index as u32, mesh));
-            continue;
-        };
-        let Some(to_object) = WorldToObject::new(to_world) else { continue };
-        let tree = match tree_of_mesh.get(&instance.mesh) {
-            Some(&tree) => tree,
-            None => {
-                instances.trees.push(build_blas(&[(0, mesh)], &masks)?);
-                let tree = instances.trees.len() - 1;
-                tree_of_mesh.insert(instance.mesh, tree);
-                tree
-            }
-        };
-        let tree_bounds = &instances.trees[tree].tree;
-        if tree_bounds.nodes.is_empty() {
-            continue;
+/// The upper level: where instances stand.
+pub struct Placements {
+    tree: WideTree,
+    leaves: Vec<[u32; WIDTH]>,
+    placed: Vec<Placed>,
+    /// Instances of meshes that are in world space already.
+    pub fixed: Vec<u32>,
+}
+
+impl Instances {
+    /// Finds where instances stand; trees of meshes that have none yet are added.
+    pub fn place(&mut self, scene: &Scene, masks: &AlphaMasks) -> Result<Placements, BvhError> {
+        if scene.instances.len() >= LEAF as usize {
+            return Err(BvhError::TooManyTriangles);
         }
-        let Some([lower, upper]) = world_bounds(to_world, tree_bounds.bounds) else { continue };
-        let number = instances.placed.len() as u32;
-        boxes.push(Primitive::new(lower.into(), upper.into(), number));
-        instances.placed.push(Placed { instance: index as u32, tree, to_object });
-    }
-    let collapsed = build_wide(boxes);
-    instances.leaves = collapsed
-        .groups
-        .iter()
-        .map(|group| {
-            let range = group.first as usize..(group.first + group.count) as usize;
-            let mut leaf = [u32::MAX; WIDTH];
-            for (slot, &number) in leaf.iter_mut().zip(&collapsed.order[range]) {
-                *slot = number;
+        let (mut fixed, mut placed, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, instance) in scene.instances.iter().enumerate() {
+            let mesh = mesh_of(scene, index)?;
+            let Some(to_world) = &instance.to_world else {
+                fixed.push(index as u32);
+                continue;
+            };
+            let Some(to_object) = WorldToObject::new(to_world) else { continue };
+            let tree = match self.tree_of_mesh.get(&instance.mesh) {
+                Some(&tree) => tree,
+                None => {
+                    self.trees.push(build_blas(&[(0, mesh)], masks)?);
+                    let tree = self.trees.len() - 1;
+                    self.tree_of_mesh.insert(instance.mesh, tree);
+                    tree
+                }
+            };
+            let tree_bounds = &self.trees[tree].tree;
+            if tree_bounds.nodes.is_empty() {
+                continue;
             }
-            leaf
-        })
-        .collect();
-    instances.tree = collapsed.tree;
-    Ok((build_blas(&fixed, &masks)?, instances))
+            let Some([lower, upper]) = world_bounds(to_world, tree_bounds.bounds) else { continue };
+            let number = placed.len() as u32;
+            boxes.push(Primitive::new(lower.into(), upper.into(), number));
+            placed.push(Placed { instance: index as u32, tree, to_object });
+        }
+        let collapsed = build_wide(boxes);
+        let leaves = collapsed
+            .groups
+            .iter()
+            .map(|group| {
+                let range = group.first as usize..(group.first + group.count) as usize;
+                let mut leaf = [u32::MAX; WIDTH];
+                for (slot, &number) in leaf.iter_mut().zip(&collapsed.order[range]) {
+                    *slot = number;
+                }
+                leaf
+            })
+            .collect();
+        Ok(Placements { tree: collapsed.tree, leaves, placed, fixed })
+    }
+
+    /// Entries that a traversal of either level keeps at most.
+    pub fn stack_bound(&self, placements: &Placements, fixed: &Blas) -> usize {
+        let of_meshes = self.trees.iter().chain([fixed]).map(|blas| blas.tree.stack_bound).max();
+        of_meshes.unwrap_or(0).max(placements.tree.stack_bound)
+    }
+
+    /// Takes over where instances stand.
+    pub fn set(&mut self, placements: Placements) {
+        (self.tree, self.leaves, self.placed) = (placements.tree, placements.leaves, placements.placed);
+    }
+}
+
+fn mesh_of(scene: &Scene, instance: usize) -> Result<&Arc<TriangleMesh>, BvhError> {
+    let mesh = scene.instances[instance].mesh;
+    scene.meshes.get(mesh as usize).ok_or(BvhError::NoSuchMesh { instance, mesh })
+}
+
+/// Builds the tree of all triangles that are in world space already.
+pub fn build_fixed(scene: &Scene, fixed: &[u32], masks: &AlphaMasks) -> Result<Blas, BvhError> {
+    let meshes = fixed.iter().map(|&instance| Ok((instance, mesh_of(scene, instance as usize)?)));
+    build_blas(&meshes.collect::<Result<Vec<_>, _>>()?, masks)
 }

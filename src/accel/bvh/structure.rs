@@ -1,20 +1,22 @@
 //! The acceleration structure: trees of triangles, a tree of instances, and how queries are dispatched.
 
 use crate::accel::largest_coordinate;
-use crate::scene::Scene;
+use crate::scene::{AlphaMasks, Scene};
 
 use super::blas::Blas;
 use super::error::BvhError;
 use super::level::{Dispatch, SimdLevel};
 use super::node::WIDTH;
 use super::packet::GROUP_TEST;
-use super::scene_tree::{Instances, Placed, build_scene};
+use super::scene_tree::{Instances, Placed, build_fixed};
 use super::traverse::STACK;
 
 /// Ray queries in pure Rust.
 pub struct BvhAccel {
     /// All triangles that are in world space already.
     pub(super) fixed: Blas,
+    /// Their instances.
+    in_world: Vec<u32>,
     pub(super) instances: Instances,
     pub(super) dispatch: Dispatch,
     level: SimdLevel,
@@ -43,15 +45,35 @@ impl BvhAccel {
     #[doc(hidden)]
     pub fn with_level(scene: &Scene, level: SimdLevel) -> Result<Self, BvhError> {
         let dispatch = Dispatch::new(level).ok_or(BvhError::Unsupported(level))?;
-        let (fixed, instances) = build_scene(scene)?;
-        let needed = instances.trees.iter().chain([&fixed]).map(|blas| blas.tree.stack_bound).max();
-        let needed = needed.unwrap_or(0).max(instances.tree.stack_bound);
-        // A small group of rays starts with an entry per ray.
-        let needed = needed + GROUP_TEST as usize;
-        if needed > STACK {
-            return Err(BvhError::TooDeep { needed, limit: STACK });
+        let masks = AlphaMasks::of_scene(scene);
+        let mut instances = Instances::default();
+        let placements = instances.place(scene, &masks)?;
+        let fixed = build_fixed(scene, &placements.fixed, &masks)?;
+        check_depth(instances.stack_bound(&placements, &fixed))?;
+        let in_world = placements.fixed.clone();
+        instances.set(placements);
+        Ok(Self { fixed, in_world, instances, dispatch, level, largest: largest_coordinate(scene) })
+    }
+
+    /// Makes it the structure of a scene that differs only in where instances stand: trees of meshes are kept.
+    ///
+    /// # Errors
+    /// As for [`build`](Self::build); then it is what it was.
+    pub(in crate::accel) fn rebuild(&mut self, scene: &Scene) -> Result<(), BvhError> {
+        let masks = AlphaMasks::of_scene(scene);
+        let placements = self.instances.place(scene, &masks)?;
+        let fixed = if placements.fixed == self.in_world {
+            None
+        } else {
+            Some(build_fixed(scene, &placements.fixed, &masks)?)
+        };
+        check_depth(self.instances.stack_bound(&placements, fixed.as_ref().unwrap_or(&self.fixed)))?;
+        if let Some(fixed) = fixed {
+            (self.fixed, self.in_world) = (fixed, placements.fixed.clone());
         }
-        Ok(Self { fixed, instances, dispatch, level, largest: largest_coordinate(scene) })
+        self.instances.set(placements);
+        self.largest = largest_coordinate(scene);
+        Ok(())
     }
 
     /// The instruction set that queries use.
@@ -61,7 +83,7 @@ impl BvhAccel {
 
     /// Bytes of all trees; meshes and alpha masks are the scene's.
     pub(super) fn bytes(&self) -> usize {
-        let Instances { tree, leaves, placed, trees } = &self.instances;
+        let Instances { tree, leaves, placed, trees, .. } = &self.instances;
         let of_triangles: usize = trees.iter().chain([&self.fixed]).map(Blas::bytes).sum();
         of_triangles
             + tree.bytes()
@@ -69,4 +91,11 @@ impl BvhAccel {
             + placed.capacity() * size_of::<Placed>()
             + trees.capacity() * size_of::<Blas>()
     }
+}
+
+/// Refuses trees that are too deep for the stack of a traversal.
+fn check_depth(stack_bound: usize) -> Result<(), BvhError> {
+    // A small group of rays starts with an entry per ray.
+    let needed = stack_bound + GROUP_TEST as usize;
+    if needed > STACK { Err(BvhError::TooDeep { needed, limit: STACK }) } else { Ok(()) }
 }

@@ -17,6 +17,8 @@ use crate::simd::LANES;
 #[derive(Default)]
 pub struct DirectField {
     pub(super) bits: StoredBits,
+    /// The bits that something moved in front of, by slot and chunk as `bits`; those of points behind its end are all right.
+    pub(super) stale: Vec<VisibilityBits>,
     light: DerivedValues,
     irradiance: DerivedValues,
 }
@@ -106,7 +108,10 @@ impl DirectField {
 
     /// Bytes held.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.bits.memory_bytes() + self.light.memory_bytes() + self.irradiance.memory_bytes()
+        self.bits.memory_bytes()
+            + self.stale.capacity() * size_of::<VisibilityBits>()
+            + self.light.memory_bytes()
+            + self.irradiance.memory_bytes()
     }
 }
 

@@ -5,6 +5,7 @@ use glam::{Vec3, Vec4};
 use super::derived::Basis;
 use super::estimators::FieldEstimator;
 use super::field::DirectField;
+use super::moved::{KeptBits, Motion};
 use super::spherical_harmonics;
 use crate::Bounds;
 use crate::accel::Accel;
@@ -94,9 +95,13 @@ impl DirectMesh {
         interpolation: &DirectInterpolation,
         needed: &PointMask,
     ) -> DirectEvaluation {
+        let basis = Basis::of(interpolation.estimator);
+        // What is derived, is derived of all points at once.
+        let before = if basis == Basis::Bits { 0 } else { self.retrace(world, None) };
         let (evaluated, shadow) = self.trace(world, needed);
+        let shadow = before + shadow;
         let Self { store, field } = self;
-        field.derive(world.lights, Basis::of(interpolation.estimator), store.positions());
+        field.derive(world.lights, basis, store.positions());
         let inside = if interpolation.leaks == Leaks::Invalidate {
             store.find_inside(world.accel, world.scene, usize::MAX)
         } else {
@@ -109,6 +114,7 @@ impl DirectMesh {
     fn trace<A: Accel>(&mut self, world: World<A>, needed: &PointMask) -> (u64, u64) {
         let corners = self.store.corners_of(needed);
         let coarser = if corners.len() > 0 { self.trace(world, &corners) } else { (0, 0) };
+        let retraced = self.retrace(world, Some(needed));
         let Self { store, field } = self;
         let new = store.allocate(needed);
         let points = store.positions();
@@ -120,7 +126,42 @@ impl DirectMesh {
         } else {
             field.trace(world.accel, world.lights, points)
         };
-        (coarser.0 + new.len() as u64, coarser.1 + rays)
+        (coarser.0 + new.len() as u64, coarser.1 + retraced + rays)
+    }
+
+    /// Traces the bits of the needed points, or of all, that something moved in front of; returns the number of rays.
+    fn retrace<A: Accel>(&mut self, world: World<A>, needed: Option<&PointMask>) -> u64 {
+        let Self { store, field } = self;
+        if field.stale.is_empty() {
+            return 0;
+        }
+        let chunks = world.lights.chunks().len();
+        let slots = match needed {
+            Some(needed) => store.known_slots(needed),
+            None => (0..store.positions().len() as u32).collect(),
+        };
+        let slots = field.stale_among(slots.into_iter(), chunks);
+        field.retrace(world.accel, world.lights, store.positions(), &slots)
+    }
+
+    /// Forgets what a motion may have changed, and whatever follows from where lights are; returns what stays known.
+    pub(crate) fn forget_moved(&mut self, lights: &PackedLights, motion: &Motion) -> KeptBits {
+        let Self { store, field } = self;
+        // Bits of finer points follow from those of coarser ones around them.
+        if store.points.has_levels() {
+            return self.forget_all(lights);
+        }
+        store.forget_inside();
+        field.forget_derived();
+        field.mark_moved(lights, store.positions(), motion)
+    }
+
+    /// Forgets all points; returns that none stays known.
+    pub(crate) fn forget_all(&mut self, lights: &PackedLights) -> KeptBits {
+        let points_changed = self.store.positions().len() as u64;
+        let bits_forgotten = points_changed * lights.len() as u64;
+        *self = Self::new(self.store.points.bounds());
+        KeptBits { points_changed, bits_forgotten, ..KeptBits::default() }
     }
 
     /// The mesh as surface points interpolate it.

@@ -5,6 +5,7 @@ mod derived;
 mod estimators;
 mod field;
 mod mesh;
+mod moved;
 mod refine;
 mod saved;
 // For tests and benches only.
@@ -15,6 +16,8 @@ mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};
+pub use moved::KeptBits;
+pub(crate) use moved::Motion;
 pub(crate) use witnesses::Witnesses;
 
 // For tests and benches only.

@@ -83,7 +83,7 @@ impl DirectField {
 }
 
 /// Which of up to sixteen points see a light of a chunk.
-fn seen_from<A: Accel>(
+pub(super) fn seen_from<A: Accel>(
     accel: &A,
     chunk: &LightChunk,
     light: usize,

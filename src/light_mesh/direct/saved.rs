@@ -1,5 +1,7 @@
 //! The direct mesh in files: the visibility bits of its known points.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use super::field::DirectField;
@@ -25,9 +27,13 @@ impl DirectMesh {
         lights: &PackedLights,
         writer: &mut SectionsWriter,
     ) -> Result<(), MeshFileError> {
-        let known = self.store.known();
-        self.store.save(&known, &POINTS, writer)?;
         let chunks = lights.chunks().len();
+        // What something moved in front of is to be traced again, and not known.
+        let known = self.store.known();
+        let stale = self.field.stale_among(known.iter().map(|known| known.1), chunks);
+        let stale: HashSet<u32> = stale.into_iter().collect();
+        let known: Vec<(u64, u32)> = known.into_iter().filter(|(_, slot)| !stale.contains(slot)).collect();
+        self.store.save(&known, &POINTS, writer)?;
         let mut bytes = vec![0u8; known.len() * chunks * 2];
         let bits = self.field.bits();
         let of_points = bytes.par_chunks_mut((chunks * 2).max(1)).zip(&known).with_min_len(1 << 10);

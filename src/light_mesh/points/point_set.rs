@@ -71,6 +71,11 @@ impl PointSet {
         self.bounds
     }
 
+    /// Whether points of a layer build on those of a coarser one.
+    pub(crate) fn has_levels(&self) -> bool {
+        self.layers.iter().any(|layer| layer.parent.is_some())
+    }
+
     /// Number of the layer of a layout and spacing whose points build on those of so many `levels` of twice the spacing each; it is added if there
     /// is none.
     ///

@@ -49,6 +49,23 @@ impl PointStore {
         new
     }
 
+    /// Slots of those of some points that are known, each once.
+    pub(crate) fn known_slots(&self, points: &PointMask) -> Vec<u32> {
+        let ids = points.bricks().flat_map(|(brick, mask)| {
+            (0..64).filter(move |place| mask >> place & 1 == 1).map(move |place| brick * 64 + place)
+        });
+        let mut slots: Vec<u32> = ids.map(|id| self.slot(id)).filter(|&slot| slot != UNKNOWN).collect();
+        slots.sort_unstable();
+        // Points at one position share a slot.
+        slots.dedup();
+        slots
+    }
+
+    /// Forgets which points lie inside of geometry, since that has moved.
+    pub(crate) fn forget_inside(&mut self) {
+        self.inside.clear();
+    }
+
     /// The coarser points that the unknown ones among some points build on.
     pub(crate) fn corners_of(&self, needed: &PointMask) -> PointMask {
         let mut corners = NeededPoints::default();

@@ -7,6 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
+use crate::Bounds;
+use crate::scene::animation::{Animation, FRAMES_PER_SECOND};
 use crate::scene::{Falloff, Scene};
 use crate::settings::{IndirectSettings, Radius, Resolve, Settings};
 
@@ -36,7 +38,7 @@ pub fn open_scene(path: &Path) -> Result<OpenedScene, LoadError> {
 impl OpenedScene {
     /// Turns a model into a scene: physical units, and mesh points at a distance that suits it.
     pub fn of_model(model: Model) -> Self {
-        let Model { meshes, instances, materials, parts: _, lights, cameras, skipped, warnings } = model;
+        let Model { meshes, instances, materials, parts: _, lights, cameras, rig, skipped, warnings } = model;
         let scene = Scene {
             meshes: meshes.into_iter().map(Arc::new).collect(),
             instances,
@@ -44,6 +46,7 @@ impl OpenedScene {
             lights,
             falloff: Falloff::InverseSquare,
             background: Vec3::ZERO,
+            extent: Bounds::EMPTY,
         };
         let mut settings = Settings::default();
         settings.shading.lambertian = true;
@@ -52,7 +55,8 @@ impl OpenedScene {
         settings.shading.resolve = Resolve::Trace;
         settings.derive_indirect().bounces = IndirectSettings::ALL_BOUNCES;
         let choices = vec!["shadow edges traced".to_owned(), "light from surfaces".to_owned()];
-        let loaded = LoadedScene { scene, cameras, settings, skipped, warnings };
+        let animation = Animation::new(FRAMES_PER_SECOND, rig, Vec::new(), &scene, &cameras);
+        let loaded = LoadedScene { scene, cameras, animation, settings, skipped, warnings };
         Self { loaded, choices, bare: true }
     }
 }

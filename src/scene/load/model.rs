@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::{Skipped, Warning};
+use crate::scene::animation::Rig;
 use crate::scene::{Camera, Instance, Light, Material, TriangleMesh};
 
 /// What one model file holds.
@@ -20,6 +21,8 @@ pub struct Model {
     pub lights: Vec<Light>,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
+    /// What moves of instances, lights and cameras.
+    pub rig: Rig,
     /// Elements of the file that were left out, counted.
     pub skipped: Skipped,
     /// Warnings for the user.

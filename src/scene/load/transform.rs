@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, DMat3, Mat3A, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{Camera, Light, LightKind, Positions, TriangleMesh};
+use crate::scene::{Positions, TriangleMesh};
 
 /// Whether directions survive a linear map.
 pub fn is_invertible(linear: &Mat3A) -> bool {
@@ -28,33 +28,6 @@ pub fn move_mesh(mesh: &mut TriangleMesh, to_world: &Affine3A) {
     if linear.determinant() < 0.0 {
         let turned = mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
         mesh.triangles = Arc::new(turned);
-    }
-}
-
-/// A light in another place; its intensity is that of the file whatever the scale.
-pub fn moved_light(light: &Light, to_world: &Affine3A) -> Light {
-    let turned = |direction: Vec3| to_world.transform_vector3(direction).normalize_or(direction);
-    let kind = match light.kind {
-        LightKind::Point => LightKind::Point,
-        LightKind::Ball { radius } => {
-            let scale = double(&to_world.matrix3).determinant().abs().cbrt() as f32;
-            LightKind::Ball { radius: radius * scale }
-        }
-        LightKind::Spot { direction, inner_cosine, outer_cosine } => {
-            LightKind::Spot { direction: turned(direction), inner_cosine, outer_cosine }
-        }
-        LightKind::Directional { direction } => LightKind::Directional { direction: turned(direction) },
-    };
-    Light { position: to_world.transform_point3(light.position), kind, ..*light }
-}
-
-/// A camera in another place.
-pub fn moved_camera(camera: &Camera, to_world: &Affine3A) -> Camera {
-    Camera {
-        position: to_world.transform_point3(camera.position),
-        look_at: to_world.transform_point3(camera.look_at),
-        up: to_world.transform_vector3(camera.up).normalize_or(camera.up),
-        ..camera.clone()
     }
 }
 

@@ -49,7 +49,7 @@ fn load_in(folder: &TempDir, text: &str) -> Result<LoadedScene, LoadError> {
 /// Loads `text` with a camera and a model added where it has none.
 fn load(text: &str) -> Result<LoadedScene, LoadError> {
     let mut whole = text.to_owned();
-    if !text.contains("[camera]") {
+    if !text.contains("[camera]") && !text.contains("[[camera]]") {
         whole.push_str(CAMERA);
     }
     if !text.contains("[[geometry]]") {
@@ -112,6 +112,9 @@ fn exactly_the_documented_keys_are_accepted() {
     for heading in [
         "## `[render]`",
         "## `[camera]`",
+        "### `[[camera.keyframes]]`",
+        "### `[camera.turntable]`",
+        "## `[animation]`",
         "## `[[material]]`",
         "## `[[light]]`",
         "## `[[light_box]]`",
@@ -122,6 +125,8 @@ fn exactly_the_documented_keys_are_accepted() {
         let header = heading.trim_start_matches('#').trim().trim_matches('`');
         assert_eq!(accepted_keys(header), documented_keys(&text, heading), "{header}");
     }
+    let of_geometry = accepted_keys("[[geometry]]\nfile = \"model.obj\"\n[[geometry.keyframes]]");
+    assert_eq!(of_geometry, documented_keys(&text, "### `[[geometry.keyframes]]`"));
     let tables = ["indirect", "region"].map(str::to_owned);
     let mut points = documented_keys(&text, "## `[light_mesh]`");
     let direct: BTreeSet<String> = accepted_keys("[light_mesh]");
@@ -134,8 +139,18 @@ fn exactly_the_documented_keys_are_accepted() {
     assert_eq!(accepted_keys("[light_mesh.indirect]"), indirect);
     let mut top = documented_keys(&text, "## Top-level keys");
     top.extend(
-        ["camera", "render", "geometry", "material", "light", "light_box", "light_grid", "light_mesh"]
-            .map(str::to_owned),
+        [
+            "camera",
+            "animation",
+            "render",
+            "geometry",
+            "material",
+            "light",
+            "light_box",
+            "light_grid",
+            "light_mesh",
+        ]
+        .map(str::to_owned),
     );
     assert_eq!(accepted_keys(""), top);
 }
@@ -159,6 +174,44 @@ fn mistakes_name_file_line_and_key() {
         ),
         ("[camera]\nposition = [0, 5, 0]\nlook_at = [0, 1, 0]", "1: camera.up: must not be parallel"),
         ("[camera]\nposition = [0, 5, 0]", "1: camera.look_at: is required"),
+        (
+            "[[camera]]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\n[[camera]]\nposition = [0, 5, 0]\nlook_at = [0, 1, 0]",
+            "4: camera[1].up: must not be parallel",
+        ),
+        ("[[camera]]\nposition = [0, 5, 0]", "1: camera[0].look_at: is required"),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ position = [1, 2, 3] }]",
+            "4: camera.keyframes[0].time: is required",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ time = 1, up = [0, 0, 0] }]",
+            "4: camera.keyframes[0].up: must not be the zero",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ time = 1, vertical_fov = 30 }, { time = 1 }]",
+            "4: camera.keyframes: times must rise, found 1 after 1",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ time = 1 }]",
+            "4: camera.keyframes: change nothing",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ time = 2, position = [0, 1, 0] }]",
+            "4: camera.keyframes: at time 2, look_at must differ from position",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\ninterpolation = \"smooth\"",
+            "4: camera.interpolation: needs keyframes",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nturntable = { frames = 0 }",
+            "4: camera.turntable.frames: must be greater than 0",
+        ),
+        (
+            "[camera]\nposition = [0, 2, 5]\nlook_at = [0, 1, 0]\nkeyframes = [{ time = 1, vertical_fov = 30 }]\nturntable = { frames = 9 }",
+            "5: camera.turntable: excludes keyframes",
+        ),
+        ("[animation]\nframes_per_second = 0", "2: animation.frames_per_second: must be greater than 0"),
         ("background = -1", "1: background: must not be negative"),
         ("background = 1e39", "1: background: must be a finite"),
         ("colour = 1", "1: colour: unknown key"),
@@ -220,6 +273,19 @@ fn mistakes_name_file_line_and_key() {
         (
             "[[geometry]]\nfile = \"model.obj\"\nrotate = { axis = [0, 0, 0], degrees = 3 }",
             "3: geometry[0].rotate.axis: must not be the zero",
+        ),
+        (
+            "[[geometry]]\nfile = \"model.obj\"\nkeyframes = [{ time = 0, scale = 0 }]",
+            "3: geometry[0].keyframes[0].scale: must not be 0",
+        ),
+        ("[[geometry]]\nfile = \"model.obj\"\nkeyframes = []", "3: geometry[0].keyframes: change nothing"),
+        (
+            "[[geometry]]\nfile = \"model.obj\"\nkeyframes = [{ time = 0, rotate = [0, 1, 0] }, { time = 1, rotate = { axis = [0, 1, 0], degrees = 3 } }]",
+            "3: geometry[0].keyframes: all rotations must be three angles, or all about the same axis; not so at time 1",
+        ),
+        (
+            "[[geometry]]\nfile = \"model.obj\"\nmatrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\nkeyframes = [{ time = 0, scale = 2 }]",
+            "4: geometry[0].keyframes: excludes matrix",
         ),
         ("[[material]]\nname = \"lead\"", "1: material[0].name: no triangle has a material 'lead'"),
         ("[[material]]\nobject = \"lead\"", "1: material[0].object: there is no object or group 'lead'"),

@@ -4,6 +4,7 @@
 //! number is looked up with a check, since files come from anywhere.
 
 mod accessor;
+mod animation;
 mod document;
 mod extensions;
 mod material;
@@ -46,11 +47,28 @@ pub fn read_gltf(bytes: &[u8], path: &Path) -> Result<Model, LoadError> {
     extensions::check(&document, &mut model.warnings)?;
     let converted = Materials::convert(&document, &mut model.warnings)?;
     let nodes = document.placed_nodes()?;
-    for placed in &nodes {
-        model.lights.extend(document.light(placed)?);
-        model.cameras.extend(document.camera(placed, &mut model.warnings)?);
+    let mut rig = document.rig(&nodes)?;
+    let moving = rig.moving();
+    let moves = |number: usize| moving.get(number) == Some(&true);
+    for (number, placed) in nodes.iter().enumerate() {
+        if let Some(light) = document.light(placed)? {
+            rig.lights.extend(moves(number).then_some((model.lights.len() as u32, number as u32)));
+            model.lights.push(light);
+        }
+        if let Some(camera) = document.camera(placed, &mut model.warnings)? {
+            rig.cameras.extend(moves(number).then_some((model.cameras.len() as u32, number as u32)));
+            model.cameras.push(camera);
+        }
     }
-    Placer { document: &document, converted: &converted, nodes: &nodes, model: &mut model }.place_all()?;
+    model.rig = rig;
+    let mut placer = Placer {
+        document: &document,
+        converted: &converted,
+        nodes: &nodes,
+        moving: &moving,
+        model: &mut model,
+    };
+    placer.place_all()?;
     if model.instances.is_empty() {
         return Err(LoadError::Empty { file: path.to_owned(), skipped: model.skipped });
     }
@@ -72,7 +90,8 @@ struct Shown {
 struct Uses {
     shown: Shown,
     name: String,
-    places: Vec<DAffine3>,
+    /// With the number of the node.
+    places: Vec<(usize, DAffine3)>,
 }
 
 /// Puts meshes where nodes have them.
@@ -80,6 +99,8 @@ struct Placer<'a> {
     document: &'a Document<'a>,
     converted: &'a [Converted],
     nodes: &'a [PlacedNode],
+    /// Which of them move.
+    moving: &'a [bool],
     model: &'a mut Model,
 }
 
@@ -87,7 +108,7 @@ impl Placer<'_> {
     fn place_all(&mut self) -> Result<(), LoadError> {
         let mut uses: Vec<Uses> = Vec::new();
         let mut known: HashMap<Shown, usize> = HashMap::new();
-        for placed in self.nodes {
+        for (number, placed) in self.nodes.iter().enumerate() {
             let node = &self.document.root.nodes[placed.index];
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
             let own_shape = node.skin.is_some() || node.weights.is_some();
@@ -99,8 +120,10 @@ impl Placer<'_> {
             });
             let places = &mut uses[index].places;
             match self.document.gpu_instances(placed.index)? {
-                Some(instances) => places.extend(instances.into_iter().map(|local| placed.to_world * local)),
-                None => places.push(placed.to_world),
+                Some(instances) => {
+                    places.extend(instances.into_iter().map(|local| (number, placed.to_world * local)));
+                }
+                None => places.push((number, placed.to_world)),
             }
         }
         uses.into_iter().try_for_each(|uses| self.place(uses))
@@ -109,13 +132,23 @@ impl Placer<'_> {
     fn place(&mut self, uses: Uses) -> Result<(), LoadError> {
         let Some(mut mesh) = self.mesh(uses.shown)? else { return Ok(()) };
         let mut places = uses.places;
-        if uses.shown.node.is_some_and(|node| self.document.root.nodes[node].skin.is_some()) {
+        let is_skinned = uses.shown.node.is_some_and(|node| self.document.root.nodes[node].skin.is_some());
+        if is_skinned {
             // Joints place a skinned mesh; its node doesn't.
-            places = vec![DAffine3::IDENTITY];
+            places = vec![(0, DAffine3::IDENTITY)];
         }
         let all = places.len();
-        let mut places: Vec<_> = places.iter().map(single).collect();
-        places.retain(|to_world| is_invertible(&to_world.matrix3));
+        places.retain(|(_, to_world)| is_invertible(&single(to_world).matrix3));
+        let first = self.model.instances.len();
+        if !is_skinned {
+            let moving =
+                places.iter().enumerate().filter(|(_, (node, _))| self.moving.get(*node) == Some(&true));
+            let hung = moving.map(|(place, (node, _))| ((first + place) as u32, *node as u32));
+            self.model.rig.instances.extend(hung);
+        } else if self.moving.contains(&true) {
+            self.note("skinned meshes");
+        }
+        let places: Vec<_> = places.iter().map(|(_, to_world)| single(to_world)).collect();
         self.model.skipped.flat_instances += (all - places.len()) as u64;
         if let Some(bad) = places.iter().find(|place| !self.fits(&mesh, place)) {
             let place = format!("meshes[{}]", uses.shown.mesh);
@@ -139,6 +172,14 @@ impl Placer<'_> {
         self.model.parts.push(Part { mesh: index, object: uses.name, group: mesh.name.clone(), triangles });
         self.model.meshes.push(mesh);
         Ok(())
+    }
+
+    /// Tells that something stands still that may move in the file.
+    fn note(&mut self, what: &str) {
+        let note = format!("{}: {what} don't move", self.document.path.display());
+        if !self.model.rig.notes.contains(&note) {
+            self.model.rig.notes.push(note);
+        }
     }
 
     /// Whether the mesh stays within what the backends can take.

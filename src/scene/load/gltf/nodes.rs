@@ -7,6 +7,7 @@ use gltf_json::validation::Checked;
 use serde_json::Value;
 
 use super::document::Document;
+use crate::scene::animation::Local;
 use crate::scene::load::{LoadError, Warning};
 use crate::scene::{Camera, Light, LightKind};
 
@@ -14,6 +15,8 @@ use crate::scene::{Camera, Light, LightKind};
 pub struct PlacedNode {
     /// Index of the node.
     pub index: usize,
+    /// The node that it is relative to, by its place among the nodes of the scene.
+    pub parent: Option<usize>,
     /// Node to scene, in double precision: long chains of nodes would lose digits.
     pub to_world: DAffine3,
 }
@@ -34,11 +37,11 @@ impl Document<'_> {
         let mut seen = vec![false; nodes.len()];
         let mut placed = Vec::new();
         // Not by recursion: a file may nest more nodes than the stack holds.
-        let mut pending: Vec<(usize, DAffine3, String)> = Vec::new();
+        let mut pending: Vec<(usize, Option<usize>, DAffine3, String)> = Vec::new();
         let mut roots = self.scene_roots()?;
         roots.reverse();
-        pending.extend(roots.into_iter().map(|root| (root, DAffine3::IDENTITY, "scene".to_owned())));
-        while let Some((index, parent, place)) = pending.pop() {
+        pending.extend(roots.into_iter().map(|root| (root, None, DAffine3::IDENTITY, "scene".to_owned())));
+        while let Some((index, parent, parent_to_world, place)) = pending.pop() {
             let Some(node) = nodes.get(index) else {
                 return Err(self.error(&place, format!("nodes[{index}] does not exist")));
             };
@@ -47,13 +50,15 @@ impl Document<'_> {
                 let problem = "is reached twice: it has two parents, or is its own ancestor".to_owned();
                 return Err(self.error(&place, problem));
             }
-            let to_world = parent * local(node);
+            let to_world = parent_to_world * local(node).matrix();
             if !single(&to_world).is_finite() {
                 return Err(self.error(&place, "its transform is not finite".to_owned()));
             }
             let children = node.children.iter().flatten().rev();
-            pending.extend(children.map(|child| (child.value(), to_world, format!("{place}.children"))));
-            placed.push(PlacedNode { index, to_world });
+            let own = Some(placed.len());
+            let pend = |child: usize| (child, own, to_world, format!("{place}.children"));
+            pending.extend(children.map(|child| pend(child.value())));
+            placed.push(PlacedNode { index, parent, to_world });
         }
         Ok(placed)
     }
@@ -214,17 +219,17 @@ impl Document<'_> {
 }
 
 /// A node relative to its parent.
-fn local(node: &Node) -> DAffine3 {
+pub fn local(node: &Node) -> Local {
     if let Some(matrix) = node.matrix {
-        return DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from)));
+        return Local::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))));
     }
     let vector =
         |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
-    DAffine3::from_scale_rotation_translation(
-        vector(node.scale, DVec3::ONE),
-        node.rotation.map_or(DQuat::IDENTITY, |rotation| quaternion(rotation.0)),
-        vector(node.translation, DVec3::ZERO),
-    )
+    Local::Steps {
+        scale: vector(node.scale, DVec3::ONE),
+        rotation: node.rotation.map_or(DQuat::IDENTITY, |rotation| quaternion(rotation.0)),
+        translation: vector(node.translation, DVec3::ZERO),
+    }
 }
 
 /// A rotation; writers round, so it is made unit length again.

@@ -4,15 +4,27 @@ use std::sync::Arc;
 
 use glam::Affine3A;
 
+use super::keyframes::still_node;
+use crate::scene::animation::{Counts, Node, Rig, double};
 use crate::scene::load::{Model, Skipped, Warning, transform};
 use crate::scene::{Camera, Instance, Material, Scene, TriangleMaterials, TriangleMesh};
+
+/// Where a model stands.
+pub struct Placement {
+    /// Model to world; `None` where the file states no transform.
+    pub to_world: Option<Affine3A>,
+    /// How it moves from there, if it does.
+    pub motion: Option<Node>,
+}
 
 /// The scene so far.
 #[derive(Default)]
 pub struct Gathered {
     /// Its geometry, materials and lights.
     pub scene: Scene,
-    /// Cameras, that of the scene file first.
+    /// What moves of them with a node.
+    pub rig: Rig,
+    /// Cameras, those of the scene file first.
     pub cameras: Vec<Camera>,
     /// Elements of the models that were left out.
     pub skipped: Skipped,
@@ -22,7 +34,7 @@ pub struct Gathered {
 
 impl Gathered {
     /// Adds a model in all its placements.
-    pub fn add(&mut self, model: Model, placements: &[Option<Affine3A>]) {
+    pub fn add(&mut self, model: Model, placements: &[Placement]) {
         let scene = &mut self.scene;
         let first_mesh = scene.meshes.len() as u32;
         let first_material = scene.materials.len() as u32;
@@ -35,14 +47,23 @@ impl Gathered {
                 TriangleMaterials::PerTriangle(list) => list.iter_mut().for_each(|m| *m += first_material),
             }
         }
-        for placement in placements {
-            let to_world = placement.unwrap_or(Affine3A::IDENTITY);
-            scene.lights.extend(model.lights.iter().map(|light| transform::moved_light(light, &to_world)));
-            let cameras = model.cameras.iter().map(|camera| transform::moved_camera(camera, &to_world));
+        let of_model =
+            Counts { instances: instances.len(), lights: model.lights.len(), cameras: model.cameras.len() };
+        for (number, placement) in placements.iter().enumerate() {
+            let to_world = placement.to_world.unwrap_or(Affine3A::IDENTITY);
+            let root = placement.motion.clone().unwrap_or_else(|| still_node(double(&to_world)));
+            let first = Counts {
+                instances: scene.instances.len() + number * of_model.instances,
+                lights: scene.lights.len(),
+                cameras: self.cameras.len(),
+            };
+            self.rig.append(&model.rig, root, of_model, first);
+            scene.lights.extend(model.lights.iter().map(|light| light.moved(&to_world)));
+            let cameras = model.cameras.iter().map(|camera| camera.moved(&to_world));
             self.cameras.extend(cameras);
         }
         // Geometry that stands in one place only is moved there, which spares rays the way through an instance.
-        let mut placements = placements.to_vec();
+        let mut placements: Vec<_> = placements.iter().map(|placement| placement.to_world).collect();
         if let ([Some(to_world)], true) =
             (placements.as_slice(), instances.iter().all(|i| i.to_world.is_none()))
         {

@@ -8,9 +8,11 @@ use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3A};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::gathered::Gathered;
+use super::gathered::{Gathered, Placement};
+use super::keyframes::{self, GeometryKeyframe, Steps};
 use super::place::Places;
 use super::values::{Color, Finite, Point, Reflectance, Rotation, ScaleFactors};
+use crate::scene::animation::{Interpolation, Node};
 use crate::scene::load::parts::{MaterialOverride, Selector};
 use crate::scene::load::{LoadError, Model, load_model, transform};
 
@@ -23,6 +25,8 @@ pub struct GeometryTable {
     rotate: Option<Rotation>,
     scale: Option<ScaleFactors>,
     matrix: Option<Spanned<[[Finite; 4]; 3]>>,
+    keyframes: Option<Spanned<Vec<GeometryKeyframe>>>,
+    interpolation: Option<Spanned<Interpolation>>,
     #[serde(default = "yes")]
     lights: bool,
     #[serde(default = "yes")]
@@ -106,6 +110,30 @@ impl GeometryTable {
     }
 }
 
+impl GeometryTable {
+    /// How the model moves, if it does.
+    fn motion(&self, index: usize, places: &Places) -> Result<Option<Node>, LoadError> {
+        let Some(keyframes) = &self.keyframes else {
+            let Some(interpolation) = &self.interpolation else { return Ok(None) };
+            let key = format!("geometry[{index}].interpolation");
+            return Err(places.error(&interpolation.span(), &key, "needs keyframes"));
+        };
+        let error =
+            |problem: &str| places.error(&keyframes.span(), &format!("geometry[{index}].keyframes"), problem);
+        if self.matrix.is_some() {
+            return Err(error("excludes matrix"));
+        }
+        let still = Steps {
+            translate: self.translate.map(|at| at.0),
+            rotate: self.rotate,
+            scale: self.scale.map(|factors| factors.0),
+        };
+        let interpolation = self.interpolation.as_ref().map(|name| *name.get_ref()).unwrap_or_default();
+        let node = keyframes::node(still, keyframes.get_ref(), interpolation);
+        node.map(Some).map_err(|problem| error(&problem))
+    }
+}
+
 /// Loads the models, each file once, applies the materials' changes, and places them.
 pub fn load(
     geometry: &[Spanned<GeometryTable>],
@@ -115,10 +143,13 @@ pub fn load(
     gathered: &mut Gathered,
 ) -> Result<(), LoadError> {
     // Keyed by the path in full, so that two spellings of one file are one model.
-    let mut models: BTreeMap<PathBuf, (Model, Vec<Option<Affine3A>>)> = BTreeMap::new();
+    let mut models: BTreeMap<PathBuf, (Model, Vec<Placement>)> = BTreeMap::new();
     let mut order = Vec::new();
     for (index, table) in geometry.iter().enumerate() {
-        let to_world = table.get_ref().to_world(index, places)?;
+        let placement = Placement {
+            to_world: table.get_ref().to_world(index, places)?,
+            motion: table.get_ref().motion(index, places)?,
+        };
         let file = &table.get_ref().file;
         let path = folder.join(file.get_ref());
         let key = format!("geometry[{index}].file");
@@ -129,7 +160,7 @@ pub fn load(
         let canonical =
             canonical.map_err(|error| places.unreadable(&file.span(), &key, path.clone(), error))?;
         if let Some((model, placements)) = models.get_mut(&canonical) {
-            placements.push(to_world);
+            placements.push(placement);
             if !table.get_ref().lights {
                 model.lights.clear();
             }
@@ -146,7 +177,7 @@ pub fn load(
             model.cameras.clear();
         }
         order.push(canonical.clone());
-        models.insert(canonical, (model, vec![to_world]));
+        models.insert(canonical, (model, vec![placement]));
     }
     for (index, table) in materials.iter().enumerate() {
         let key = format!("material[{index}]");

@@ -6,6 +6,7 @@
 mod camera;
 mod gathered;
 mod geometry;
+mod keyframes;
 mod light_mesh;
 mod lights;
 mod place;
@@ -21,24 +22,27 @@ use toml::Spanned;
 
 pub use self::lights::FalloffName;
 
-use self::camera::CameraTable;
+use self::camera::CameraTables;
 use self::gathered::Gathered;
 use self::geometry::{GeometryTable, MaterialTable};
+use self::keyframes::AnimationTable;
 use self::light_mesh::LightMeshTable;
 use self::lights::{LightBoxTable, LightGridTable, LightTable};
 use self::place::Places;
 use self::render::{PresetName, RenderTable};
 use self::values::{Color, NonNegative};
 use super::{LoadError, Skipped, Warning};
-use crate::scene::{Camera, Falloff, Scene};
+use crate::scene::{Animation, Camera, Falloff, Scene};
 use crate::settings::Settings;
 
 /// A scene, and how its file wants it rendered.
 pub struct LoadedScene {
     /// The scene.
     pub scene: Scene,
-    /// The scene file's camera first, then those of its models; at least one, but in bare models that bring none.
+    /// The scene file's cameras first, then those of its models; at least one, but in bare models that bring none.
     pub cameras: Vec<Camera>,
+    /// What moves, by frames.
+    pub animation: Animation,
     /// The defaults with the file's settings in their place.
     pub settings: Settings,
     /// Elements of the models that were left out.
@@ -55,7 +59,9 @@ struct SceneTable {
     preset: Option<PresetName>,
     falloff: Option<FalloffName>,
     falloff_constant: Option<Spanned<NonNegative>>,
-    camera: Option<Spanned<CameraTable>>,
+    camera: Option<Spanned<CameraTables>>,
+    #[serde(default)]
+    animation: AnimationTable,
     #[serde(default)]
     render: RenderTable,
     #[serde(default)]
@@ -104,8 +110,12 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
     table.light_mesh.apply(&mut settings, folder, &places)?;
 
     let mut gathered = Gathered::default();
-    if let Some(camera) = &table.camera {
-        gathered.cameras.push(CameraTable::camera(camera, &places)?);
+    let mut motions = Vec::new();
+    if let Some(cameras) = &table.camera {
+        for (index, (camera, motion)) in (0..).zip(CameraTables::cameras(cameras, &places)?) {
+            gathered.cameras.push(camera);
+            motions.extend(motion.map(|motion| (index, motion)));
+        }
     }
     let constant = table.falloff_constant.as_ref().map(|constant| *constant.get_ref());
     gathered.scene.falloff = lights::falloff(falloff, table.falloff, constant).ok_or_else(|| {
@@ -128,6 +138,8 @@ pub fn load_scene_text(text: &str, path: &Path) -> Result<LoadedScene, LoadError
     if gathered.cameras.is_empty() {
         return Err(places.error(&(0..0), "camera", "is missing, and no model has one"));
     }
-    let Gathered { scene, cameras, skipped, warnings } = gathered;
-    Ok(LoadedScene { scene, cameras, settings, skipped, warnings })
+    let Gathered { scene, rig, cameras, skipped, warnings } = gathered;
+    let frames_per_second = table.animation.frames_per_second();
+    let animation = Animation::new(frames_per_second, rig, motions, &scene, &cameras);
+    Ok(LoadedScene { scene, cameras, animation, settings, skipped, warnings })
 }

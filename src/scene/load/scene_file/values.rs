@@ -112,6 +112,17 @@ number!(
     /// Stops in [−100, 100].
     Stops, |x| x.abs() <= crate::settings::MAX_EXPOSURE, "lie in [-100, 100]");
 
+/// A time in seconds, finite.
+#[derive(Clone, Copy, Debug)]
+pub struct Seconds(pub f64);
+
+impl<'de> Deserialize<'de> for Seconds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = f64::deserialize(deserializer)?;
+        check(value, value.is_finite(), "be finite").map(Self)
+    }
+}
+
 /// A three-component type: name, how it is written, the check, and the range in words.
 macro_rules! vector {
     ($(#[$doc:meta])* $name:ident, $read:expr, |$v:ident| $holds:expr, $range:literal) => {
