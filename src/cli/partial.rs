@@ -41,6 +41,7 @@ impl TileSink for PartialPictures<'_> {
     }
 
     fn picture(&self, image: &Image) {
+        self.bar.picture(image);
         let exposure = self.exposure.unwrap_or_else(|| auto_exposure(image.pixels()));
         let options = ImageOptions { sample_type: self.sample_type, exposure, metadata: Vec::new() };
         let written = self.targets.iter().try_for_each(|target| target.write(image, &options));

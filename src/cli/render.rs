@@ -84,6 +84,7 @@ fn render_to(
     if let Some(notice) = &chosen.notice {
         reporter.line(&format!("note: {notice}"));
     }
+    reporter.detail(&format!("backend: {}", chosen.backend));
     seconds.build = stage.elapsed().as_secs_f64();
 
     let stage = Instant::now();
@@ -104,6 +105,8 @@ fn render_to(
     })?;
     seconds.view = stage.elapsed().as_secs_f64();
 
+    reporter.detail(&format!("camera: {camera:?}"));
+    reporter.detail(&format!("settings: {settings:?}"));
     let mut session = Session::with_backend(scene, chosen.backend)
         .map_err(|source| CommandError::Session { scene: args.scene.path.clone(), source })?;
     let bar = reporter.bar("rendering");

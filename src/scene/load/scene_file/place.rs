@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
 use crate::scene::load::LoadError;
+use crate::suggestion::closest;
 
 /// Makes errors for places in one scene file.
 pub struct Places<'a> {
@@ -73,7 +74,12 @@ fn missing_or_unknown(message: &str) -> (Option<&str>, String) {
     }
     if let Some((name, rest)) = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`'))
     {
-        return (Some(name), format!("unknown key{rest}"));
+        // The parser lists the keys that there are between backquotes, every second part of the rest.
+        let known = rest.split('`').skip(1).step_by(2);
+        return match closest(name, known) {
+            Some(meant) => (Some(name), format!("unknown key, did you mean `{meant}`?")),
+            None => (Some(name), format!("unknown key{rest}")),
+        };
     }
     if let Some(name) = message.strip_prefix("duplicate field `").and_then(|rest| rest.strip_suffix('`')) {
         return (Some(name), "is given twice".to_owned());
