@@ -20,6 +20,17 @@ pub fn hint<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String
     closest(found, known).map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"))
 }
 
+/// The key that a TOML file may not hold, and what there is to say about it, from the parser's message; `None` for other messages.
+pub fn unknown_key(message: &str) -> Option<(&str, String)> {
+    let (name, rest) = message.strip_prefix("unknown field `")?.split_once('`')?;
+    // The parser lists the keys that there are between backquotes: every second part of the rest.
+    let problem = match closest(name, rest.split('`').skip(1).step_by(2)) {
+        Some(meant) => format!("unknown key, did you mean `{meant}`?"),
+        None => format!("unknown key{}", rest.trim_end()),
+    };
+    Some((name, problem))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,6 +12,7 @@ use super::shared::QuietArgs;
 use crate::image::error_image::error_image;
 use crate::image::metrics::{self, Metrics, MetricsOptions};
 use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
+use crate::suggestion::hint;
 
 /// What `compare` takes.
 ///
@@ -121,7 +122,8 @@ impl FromStr for Limit {
         let (name, number) = text.split_once('=').unwrap_or((Metric::RelativeRmse.name(), text));
         let name = name.trim().replace('-', "_");
         let metric = Metric::ALL.into_iter().find(|metric| metric.name() == name).ok_or_else(|| {
-            format!("no metric {name}; there are {}", Metric::ALL.map(Metric::name).join(", "))
+            let names = Metric::ALL.map(Metric::name);
+            format!("no metric {name}{}; there are {}", hint(&name, names), names.join(", "))
         })?;
         Ok(Self { metric, limit: non_negative(number.trim())? })
     }

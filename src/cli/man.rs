@@ -62,7 +62,8 @@ fn pages(command: &Command) -> Result<Vec<(String, Vec<u8>)>, io::Error> {
 
 /// The page of the command that is found at `path` below the program.
 fn page(command: &Command, path: &[&str]) -> Result<Vec<u8>, io::Error> {
-    let man = Man::new(command.clone());
+    let version = concat!("lightmesh ", env!("CARGO_PKG_VERSION"));
+    let man = Man::new(command.clone()).source(version).manual("lightmesh");
     let mut page = Vec::new();
     man.render_title(&mut page)?;
     man.render_name_section(&mut page)?;

@@ -10,6 +10,8 @@ mod choice;
 mod command_line;
 mod compare;
 mod gallery;
+mod help;
 mod memory;
+mod progress;
 mod same_bytes;
 mod views;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
 use crate::scene::load::LoadError;
-use crate::suggestion::closest;
+use crate::suggestion::unknown_key;
 
 /// Makes errors for places in one scene file.
 pub struct Places<'a> {
@@ -72,14 +72,8 @@ fn missing_or_unknown(message: &str) -> (Option<&str>, String) {
     if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`')) {
         return (Some(name), "is required".to_owned());
     }
-    if let Some((name, rest)) = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`'))
-    {
-        // The parser lists the keys that there are between backquotes, every second part of the rest.
-        let known = rest.split('`').skip(1).step_by(2);
-        return match closest(name, known) {
-            Some(meant) => (Some(name), format!("unknown key, did you mean `{meant}`?")),
-            None => (Some(name), format!("unknown key{rest}")),
-        };
+    if let Some((name, problem)) = unknown_key(message) {
+        return (Some(name), problem);
     }
     if let Some(name) = message.strip_prefix("duplicate field `").and_then(|rest| rest.strip_suffix('`')) {
         return (Some(name), "is given twice".to_owned());
