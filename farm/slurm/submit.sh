@@ -61,7 +61,7 @@ echo "bake $bake, tiles $render"
 merge=$(submit $wait --dependency="afterok:$render" --array="0-$((count - 1))" \
     --output="$folder/logs/merge.%A_%a.log" "$here/merge.sh" "$folder" "$tiles" "$first") || failed=1
 echo "merge $merge"
-[ -n "$wait" ] || exit 0
+[ -n "$wait" ] || exit "${failed:-0}"
 # sbatch takes it for no failure that a job never ran since one that it depends on failed.
 states=$(scontrol show job "$merge" | sed -n 's/.*JobState=\([A-Z_]*\).*/\1/p' | sort -u)
 if [ -n "${failed:-}" ] || [ "$states" != COMPLETED ]; then

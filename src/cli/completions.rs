@@ -6,7 +6,6 @@ use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 
 use super::error::{CommandError, Outcome};
-use super::shared::QuietArgs;
 
 /// What `completions` takes.
 ///
@@ -16,8 +15,6 @@ use super::shared::QuietArgs;
 pub struct CompletionsArgs {
     /// The shell
     shell: Shell,
-    #[command(flatten)]
-    pub quiet: QuietArgs,
 }
 
 /// Prints the script for `command`.
