@@ -1,5 +1,8 @@
 # What the tests of farm/ share: a scene, the picture that one process makes of it, and a program that fails once.
-# Sourced by tests/slurm.sh and tests/openjd.sh, which set `what`, for messages, and `program`.
+# Sourced by tests/slurm.sh and tests/openjd.sh, which set `here`, the repository, `what`, for messages, and `program`.
+#
+# Python packages, OpenEXR and openjd-cli, are installed from PyPI into target/farm-python, or the folder that FARM_PYTHON
+# names, which is reused by later runs.
 
 skip() {
     echo "SKIPPED: $what: $1" >&2
@@ -14,7 +17,14 @@ fail() {
 for needed in python3 "$program"; do
     command -v "$needed" >/dev/null || skip "no $needed"
 done
-python3 -c 'import OpenEXR' 2>/dev/null || skip "no OpenEXR for Python (package python3-openexr)"
+python=${FARM_PYTHON:-$here/target/farm-python}
+if ! [ -e "$python/complete" ]; then
+    {
+        rm -rf "$python" && python3 -m venv "$python" &&
+            "$python/bin/pip" install --quiet --disable-pip-version-check 'openjd-cli==0.8.*' 'openexr==3.*'
+    } >&2 || skip "cannot install OpenEXR and openjd-cli from PyPI (Debian package python3-venv)"
+    touch "$python/complete"
+fi
 program=$(realpath -- "$program")
 work=$(mktemp -d)
 
@@ -46,7 +56,7 @@ SCRIPT
 # same FILE: whether a picture is the one that one process makes, by our own reader and by OpenEXR's.
 same() {
     "$program" compare "$1" "$work/whole.exr" --fail-above differing_pixels=0 --fail-above max_abs=0 >&2 || return 1
-    python3 - "$1" "$work/whole.exr" <<'SCRIPT'
+    "$python/bin/python" - "$1" "$work/whole.exr" <<'SCRIPT'
 import sys
 import OpenEXR
 

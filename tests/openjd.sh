@@ -5,8 +5,7 @@
 #
 # The templates have to be valid. Then a picture is baked, rendered in tiles and merged: it has to equal that of one
 # process, to the bit, although one of the tiles fails at first, which ends the run until that task is run again; its session
-# reads the progress of each task. OPENJD names the program openjd; without it, openjd-cli is installed from PyPI into
-# target/openjd.
+# reads the progress of each task.
 #
 # Ends with 77, and a line that says why, where that is impossible on this machine.
 set -eu
@@ -19,13 +18,7 @@ trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-openjd=${OPENJD:-$here/target/openjd/bin/openjd}
-if ! [ -x "$openjd" ]; then
-    [ -z "${OPENJD:-}" ] || fail "there is no $OPENJD"
-    { python3 -m venv "$here/target/openjd" && "$here/target/openjd/bin/pip" install --quiet 'openjd-cli==0.8.*'; } >&2 ||
-        skip "cannot install openjd-cli from PyPI"
-fi
-
+openjd=$python/bin/openjd
 for template in picture frames; do
     "$openjd" check "$here/farm/openjd/$template.yaml"
 done
@@ -50,7 +43,7 @@ if run Render --run-dependencies; then
     show Render "a tile failed, and the run ended as if all were well"
 fi
 [ -d "$work/failed" ] || show Render "no tile was to fail"
-grep -q 'exit code: 1\|exited with code: 1\|code 1' "$work/Render.log" || show Render "its exit code was not seen"
+grep -q 'exited with code: 1 ' "$work/Render.log" || show Render "its exit code was not seen"
 for tile in 2 3; do
     run Render --no-run-dependencies --task-param Tile=$tile || show Render "tile $tile failed again"
 done
