@@ -87,6 +87,7 @@ pub mod settings;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod simd;
+mod suggestion;
 mod world;
 
 pub use bounds::Bounds;

@@ -27,6 +27,21 @@ named_enum! {
     }
 }
 
+/// The Embree libraries that are installed, the one that is taken first: version and name of each.
+///
+/// # Errors
+/// Why there is none that can be used, in one line.
+pub fn embree_libraries() -> Result<Vec<String>, String> {
+    #[cfg(feature = "embree")]
+    {
+        let libraries =
+            embree_sys::Library::load_all().map_err(|error| error.to_string().replace('\n', " "))?;
+        Ok(libraries.iter().map(|library| format!("{} ({})", library.version(), library.name())).collect())
+    }
+    #[cfg(not(feature = "embree"))]
+    Err("this build has no Embree support".to_owned())
+}
+
 /// An acceleration structure of one of the backends.
 ///
 /// A `Backend` is an [`Accel`] that looks up its variant in every call, which takes little beside tracing a packet of rays.

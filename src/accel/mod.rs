@@ -17,7 +17,7 @@ pub use accel::Accel;
 // Benchmarks alone tell backends apart.
 #[cfg(feature = "cli")]
 pub(crate) use backend::with_accel;
-pub use backend::{Backend, BackendChoice, BackendError, Chosen};
+pub use backend::{Backend, BackendChoice, BackendError, Chosen, embree_libraries};
 pub use brute_force::BruteForceAccel;
 pub use bvh::{BvhAccel, BvhError, SimdLevel};
 #[cfg(feature = "embree")]

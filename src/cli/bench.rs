@@ -103,6 +103,7 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Result<Outcome, CommandErro
         resolution: args.resolution,
         samples_per_pixel: args.spp,
     };
+    reporter.detail(&format!("options: {options:?}"));
     let pool = args.threads.pool()?;
     // The threads of the pool measure; this one listens, so that the listener need not be shared.
     let (sender, messages) = std::sync::mpsc::channel::<String>();

@@ -8,9 +8,11 @@ use serde_json::{Map, Value, json};
 
 use super::error::{CommandError, Outcome};
 use super::parse::{self, non_negative, positive};
+use super::shared::QuietArgs;
 use crate::image::error_image::error_image;
 use crate::image::metrics::{self, Metrics, MetricsOptions};
 use crate::image::{self, Image, ImageError, ImageFormat, OutputTarget, png};
+use crate::suggestion::hint;
 
 /// What `compare` takes.
 ///
@@ -52,6 +54,9 @@ pub struct CompareArgs {
     /// Print JSON; numbers that are not defined, such as the PSNR of equal images, are null
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
 /// A number whose exceeding fails the comparison.
@@ -117,7 +122,8 @@ impl FromStr for Limit {
         let (name, number) = text.split_once('=').unwrap_or((Metric::RelativeRmse.name(), text));
         let name = name.trim().replace('-', "_");
         let metric = Metric::ALL.into_iter().find(|metric| metric.name() == name).ok_or_else(|| {
-            format!("no metric {name}; there are {}", Metric::ALL.map(Metric::name).join(", "))
+            let names = Metric::ALL.map(Metric::name);
+            format!("no metric {name}{}; there are {}", hint(&name, names), names.join(", "))
         })?;
         Ok(Self { metric, limit: non_negative(number.trim())? })
     }
@@ -139,15 +145,20 @@ pub fn run(args: &CompareArgs, out: &mut dyn Write) -> Result<Outcome, CommandEr
         }
         None => None,
     };
+    let reporter = args.quiet.reporter();
+    let spinner = reporter.spinner("reading");
     let image = image::read(&args.image)?;
     let reference = image::read(&args.reference)?;
+    spinner.finish_and_clear();
     let incomparable = |source| CommandError::Incomparable {
         image: args.image.clone(),
         reference: args.reference.clone(),
         source,
     };
     let options = MetricsOptions { exposure: args.exposure, threshold: args.differ_above };
+    let spinner = reporter.spinner("comparing");
     let metrics = metrics::compare(&image, &reference, options).map_err(incomparable)?;
+    spinner.finish_and_clear();
 
     if let Some(target) = error_target {
         let colours = error_image(&image, &reference, args.error_scale).map_err(incomparable)?;

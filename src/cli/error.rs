@@ -15,6 +15,7 @@ use crate::light_mesh::file::MeshFileError;
 use crate::render::{RenderError, SessionError, WriteMeshesError};
 use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
+use crate::suggestion::hint;
 
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +78,7 @@ pub enum CommandError {
         source: RenderError,
     },
     /// A scene has no camera of that name.
-    #[error("{}: no camera is named `{name}`; there are: {names}", scene.display())]
+    #[error("{}: no camera is named `{name}`{}; there are: {names}", scene.display(), hint(name, names.split(", ")))]
     NoSuchCamera {
         /// The scene file.
         scene: PathBuf,
@@ -201,7 +202,7 @@ pub enum CommandError {
         problem: String,
     },
     /// A gallery's list has no image of that name.
-    #[error("{}: no picture is named `{name}`; there are: {names}", file.display())]
+    #[error("{}: no picture is named `{name}`{}; there are: {names}", file.display(), hint(name, names.split(", ")))]
     NoSuchImage {
         /// The list.
         file: PathBuf,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::error::{CommandError, Outcome};
+use super::shared::QuietArgs;
 use crate::scene::generate::forest::Forest;
 use crate::scene::generate::interior::Interior;
 use crate::scene::generate::still_life;
@@ -15,6 +16,8 @@ pub struct GenerateArgs {
     /// What to generate.
     #[command(subcommand)]
     scene: GeneratedScene,
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
 /// What can be generated.
@@ -76,14 +79,23 @@ pub struct StillLifeArgs {
 /// # Errors
 /// [`CommandError::Generate`]; then nothing is written.
 pub fn run(args: &GenerateArgs) -> Result<Outcome, CommandError> {
-    match &args.scene {
+    let reporter = args.quiet.reporter();
+    let spinner = reporter.spinner("generating");
+    let folder = match &args.scene {
         GeneratedScene::Forest(ForestArgs { triangles, lights, seed, output }) => {
             Forest { triangles: *triangles, lights: *lights, seed: *seed }.write(output)?;
+            output
         }
         GeneratedScene::Interior(InteriorArgs { bays, lamps, output }) => {
             Interior { bays: *bays, lamps: *lamps }.write(output)?;
+            output
         }
-        GeneratedScene::StillLife(StillLifeArgs { output }) => still_life::write(output)?,
-    }
+        GeneratedScene::StillLife(StillLifeArgs { output }) => {
+            still_life::write(output)?;
+            output
+        }
+    };
+    spinner.finish_and_clear();
+    reporter.detail(&format!("wrote into {}", folder.display()));
     Ok(Outcome::Passed)
 }

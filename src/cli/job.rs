@@ -85,6 +85,8 @@ impl Job<'_> {
         let (width, height) = settings.view.resolution;
         bar.set(0, u64::from(width) * u64::from(height));
         let sinks: Vec<&dyn TileSink> = vec![&bar, &partial, &tiles];
+        reporter.detail(&format!("camera: {camera:?}"));
+        reporter.detail(&format!("settings: {settings:?}"));
         let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
         let rendered = session.render_to(camera, settings, &Sinks(sinks), &interrupt.stop);
         bar.finish();

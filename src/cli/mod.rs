@@ -4,8 +4,11 @@ mod bake;
 mod bench;
 mod choice;
 pub mod compare;
+mod completions;
 mod crosscheck;
 mod error;
+mod events;
+mod examples;
 mod frames;
 pub mod gallery;
 mod generate;
@@ -14,6 +17,7 @@ mod init;
 mod interrupt;
 mod job;
 mod light_mesh;
+mod man;
 mod merge;
 mod overrides;
 mod parse;
@@ -26,20 +30,25 @@ mod resume;
 mod shared;
 mod sinks;
 mod stats_file;
+mod version;
 mod written;
 
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind as UsageError;
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 pub use error::{CommandError, Outcome, describe};
+
+use self::shared::QuietArgs;
 
 /// Renders large triangle scenes with many lights by light meshes.
 #[derive(Debug, Parser)]
 #[command(name = "lightmesh", version, about, propagate_version = true)]
 struct Cli {
+    #[command(flatten)]
+    quiet: QuietArgs,
     #[command(subcommand)]
     command: Command,
 }
@@ -66,13 +75,29 @@ enum Command {
     Gallery(gallery::GalleryArgs),
     /// Measure how far an image is from a reference.
     Compare(compare::CompareArgs),
+    /// Print what a shell needs to complete command lines.
+    Completions(completions::CompletionsArgs),
+    /// Write manual pages.
+    Man(man::ManArgs),
+}
+
+/// The declaration of the whole command line, with examples.
+fn command() -> clap::Command {
+    examples::with_examples(Cli::command())
 }
 
 impl Cli {
+    /// Parses the program's command line.
+    fn of_program() -> Result<Self, clap::Error> {
+        let mut command = command();
+        let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+        Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?.checked()
+    }
+
     /// Refuses what the declarations of the flags can't express.
     fn checked(self) -> Result<Self, clap::Error> {
         if let Command::Bench(args) = &self.command {
-            args.check().map_err(|text| Self::command().error(UsageError::ArgumentConflict, text))?;
+            args.check().map_err(|text| command().error(UsageError::ArgumentConflict, text))?;
         }
         Ok(self)
     }
@@ -91,6 +116,8 @@ impl Command {
             Self::Crosscheck(args) => crosscheck::run(args, out),
             Self::Gallery(args) => gallery::run(args),
             Self::Compare(args) => compare::run(args, out),
+            Self::Completions(args) => completions::run(args, command(), out),
+            Self::Man(args) => man::run(args, command(), out),
         }
     }
 }
@@ -102,15 +129,22 @@ const USAGE: u8 = 2;
 ///
 /// Exit codes: 0 for success, 1 for failure, 2 for wrong usage, 3 for a light mesh of another scene, 130 or 143 for Ctrl-C or SIGTERM.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse().and_then(Cli::checked) {
+    let cli = match Cli::of_program() {
         Ok(cli) => cli,
+        Err(error)
+            if error.kind() == UsageError::DisplayVersion && version::wants_details(std::env::args_os()) =>
+        {
+            let _ = write!(io::stdout(), "{}", version::details());
+            return ExitCode::SUCCESS;
+        }
         Err(error) => {
             // A closed pipe behind --help is not an error.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { USAGE } else { 0 });
         }
     };
-    let mut out = Output(io::stdout().lock());
+    // Not locked: other threads report progress there, if they are asked to.
+    let mut out = Output(io::stdout());
     let result = cli.command.run(&mut out).and_then(|outcome| {
         out.flush()?;
         Ok(outcome)
@@ -118,7 +152,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(outcome) => outcome.into(),
         Err(error) => {
-            let _ = writeln!(io::stderr(), "lightmesh: {}", describe(&error));
+            cli.quiet.reporter().error(&describe(&error));
             error.exit_code()
         }
     }
@@ -153,7 +187,7 @@ mod tests {
     /// Clap's own checks: no flag is declared twice, defaults can be parsed.
     #[test]
     fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        command().debug_assert();
     }
 
     /// A writer that fails in one way.

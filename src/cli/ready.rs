@@ -58,6 +58,7 @@ pub fn ready_scene(
     if let Some(notice) = &chosen.notice {
         reporter.line(&format!("note: {notice}"));
     }
+    reporter.detail(&format!("backend: {}", chosen.backend));
     seconds.build = stage.elapsed().as_secs_f64();
 
     let stage = Instant::now();

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::choice::named;
 use super::error::CommandError;
+use super::events::ProgressForm;
 use super::progress::Reporter;
 use crate::accel::{BackendChoice, check_memory, parse_size};
 use crate::scene::Scene;
@@ -32,6 +33,14 @@ impl SceneArgs {
     pub fn open(&self, reporter: &Reporter) -> Result<OpenedScene, CommandError> {
         let opened = self.read(reporter)?;
         report_doubts(&opened.loaded, &self.path, reporter);
+        let LoadedScene { scene, cameras, .. } = &opened.loaded;
+        reporter.detail(&format!(
+            "{}: {} triangles, {} lights, {} cameras",
+            self.path.display(),
+            scene.triangle_count(),
+            scene.lights.len(),
+            cameras.len()
+        ));
         Ok(opened)
     }
 }
@@ -46,18 +55,24 @@ pub fn report_doubts(loaded: &LoadedScene, path: &Path, reporter: &Reporter) {
     }
 }
 
-/// Whether a command reports to stderr what it does.
+/// What a command reports while it works.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct QuietArgs {
-    /// Write nothing to stderr but errors
-    #[arg(short, long)]
+    /// Write nothing to stderr but errors, and progress where --progress asks for it
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
+    /// Say more: what was chosen, and where time goes; with --version, what this build is and which backends it finds
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+    /// Form in which progress is reported
+    #[arg(long, value_name = "FORM", global = true, default_value_t, value_parser = named::<ProgressForm>())]
+    pub progress: ProgressForm,
 }
 
 impl QuietArgs {
     /// What the command reports with.
     pub fn reporter(self) -> Reporter {
-        Reporter::new(self.quiet)
+        Reporter::new(self.quiet, self.verbose, self.progress)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Enums whose values have names, the same in scene files, on the command line and in reports.
 
+use crate::suggestion::hint;
+
 /// An enum whose values have names; which scene files, the command line and reports share.
 pub trait Named: Copy + PartialEq + Sized + 'static {
     /// Every value with its name and what it stands for, in the order in which they are listed.
@@ -25,7 +27,7 @@ pub trait Named: Copy + PartialEq + Sized + 'static {
 
 /// A text that names no value of an enum.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown name `{found}`, expected one of {expected}")]
+#[error("unknown name `{found}`{}, expected one of {expected}", hint(found, expected.split(", ")))]
 pub struct UnknownName {
     /// The text.
     pub found: String,

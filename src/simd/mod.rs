@@ -12,6 +12,20 @@ pub(crate) use lanes::{Lanes, horizontal_extremes, horizontal_sum, horizontal_su
 
 use pulp::NullaryFnOnce;
 
+/// For reports: the vector instructions that [`vectorize`] takes on this processor.
+pub fn instruction_set() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if pulp::x86::V4::try_new().is_some() {
+            return "AVX-512";
+        }
+        if pulp::x86::V3::try_new().is_some() {
+            return "AVX2";
+        }
+    }
+    "those of the target"
+}
+
 /// Runs work with the best vector instructions there are. The result is the same whichever these are: no sum is reordered
 /// and no product contracted.
 #[inline(always)]

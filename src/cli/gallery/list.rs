@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::super::error::CommandError;
+use crate::suggestion::unknown_key;
 
 /// The list of images.
 #[derive(Debug, Deserialize)]
@@ -59,7 +60,8 @@ impl Gallery {
     /// [`CommandError::Read`] and [`CommandError::Malformed`].
     pub fn read(file: &Path) -> Result<Self, CommandError> {
         let malformed = |problem: String| CommandError::Malformed { file: file.to_owned(), problem };
-        let gallery: Self = toml::from_str(&read(file)?).map_err(|error| malformed(error.to_string()))?;
+        let text = read(file)?;
+        let gallery: Self = toml::from_str(&text).map_err(|error| malformed(problem(&text, &error)))?;
         for (index, ListedImage { name, .. }) in gallery.images.iter().enumerate() {
             let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if name.is_empty() || !name.chars().all(plain) {
@@ -78,6 +80,17 @@ impl Gallery {
         }
         Ok(gallery)
     }
+}
+
+/// What the parser found wrong, in one line that begins with the line of `text`.
+fn problem(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = 1 + before.matches('\n').count();
+    let message = match unknown_key(error.message()) {
+        Some((name, problem)) => format!("{name}: {problem}"),
+        None => error.message().trim_end().replace('\n', ", "),
+    };
+    format!("line {line}: {message}")
 }
 
 /// A text file's contents.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
 use crate::scene::load::LoadError;
+use crate::suggestion::unknown_key;
 
 /// Makes errors for places in one scene file.
 pub struct Places<'a> {
@@ -71,9 +72,8 @@ fn missing_or_unknown(message: &str) -> (Option<&str>, String) {
     if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`')) {
         return (Some(name), "is required".to_owned());
     }
-    if let Some((name, rest)) = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`'))
-    {
-        return (Some(name), format!("unknown key{rest}"));
+    if let Some((name, problem)) = unknown_key(message) {
+        return (Some(name), problem);
     }
     if let Some(name) = message.strip_prefix("duplicate field `").and_then(|rest| rest.strip_suffix('`')) {
         return (Some(name), "is given twice".to_owned());
