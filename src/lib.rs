@@ -74,10 +74,12 @@ pub mod cli;
 mod color;
 #[cfg(feature = "cli")]
 pub mod crosscheck;
+// pub mod export;
 pub mod framing;
 pub mod image;
 pub mod light_mesh;
 pub mod lights;
+pub mod probe;
 pub mod render;
 // For tests and benches only.
 #[doc(hidden)]

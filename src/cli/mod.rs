@@ -12,6 +12,7 @@ mod init;
 mod overrides;
 mod parse;
 mod partial;
+mod probe;
 mod progress;
 mod render;
 mod shared;
@@ -37,6 +38,8 @@ struct Cli {
 enum Command {
     /// Render a scene file to an image.
     Render(Box<render::RenderArgs>),
+    /// Measure light at points, along a line, on a plane or in a grid.
+    Probe(Box<probe::ProbeArgs>),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -56,9 +59,12 @@ enum Command {
 impl Cli {
     /// Refuses what the declarations of the flags can't express.
     fn checked(self) -> Result<Self, clap::Error> {
-        if let Command::Bench(args) = &self.command {
-            args.check().map_err(|text| Self::command().error(UsageError::ArgumentConflict, text))?;
-        }
+        let checked = match &self.command {
+            Command::Bench(args) => args.check(),
+            Command::Probe(args) => args.check(),
+            _ => Ok(()),
+        };
+        checked.map_err(|text| Self::command().error(UsageError::ArgumentConflict, text))?;
         Ok(self)
     }
 }
@@ -67,6 +73,7 @@ impl Command {
     fn run(&self, out: &mut dyn Write) -> Result<Outcome, CommandError> {
         match self {
             Self::Render(args) => render::run(args),
+            Self::Probe(args) => probe::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),

@@ -26,7 +26,7 @@
 //! `direct_light`, `series` and `packed_colour` are what the last two have in common.
 
 pub mod direct;
-mod direct_light;
+pub(crate) mod direct_light;
 pub mod indirect;
 pub(crate) mod leaks;
 pub mod lookup;

@@ -199,7 +199,10 @@ const CELLS_ALONG_DIAGONAL: f32 = 60.0;
 const MOST_CELLS_ALONG_DIAGONAL: f32 = 2000.0;
 
 /// Width of the cells of a surface mesh.
-fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> Result<f32, MeshError> {
+///
+/// # Errors
+/// [`MeshError::TooFine`].
+pub(crate) fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> Result<f32, MeshError> {
     let diagonal = bounds.extent().length();
     match settings.points.spacing {
         Spacing::Auto => Ok(diagonal / CELLS_ALONG_DIAGONAL),

@@ -31,6 +31,7 @@ pub use accuracy::{Accuracy, Ending, ErrorEstimate, Measure};
 pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
+pub(crate) use meshes::surface_width;
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use need::needed_points;
 pub use paths::{PathVertex, TilePaths};

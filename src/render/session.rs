@@ -88,6 +88,12 @@ impl Session {
         &self.backend
     }
 
+    /// The scene with what was built from it, and the lights that the settings ask for.
+    pub(crate) fn world(&self, settings: &Settings) -> World<'_, Backend> {
+        let Self { scene, backend, lights, emissive, .. } = self;
+        World { accel: backend, scene, lights: lights.of_settings(settings), emissive }
+    }
+
     /// Changes the intensity E_i of a light; 0 switches it off. What mesh points see stays known, and what a ball's geometry shows stays as it is.
     /// Returns whether there is such a light.
     ///
