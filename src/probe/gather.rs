@@ -26,7 +26,8 @@ const RAYS_PER_BATCH: usize = 1 << 20;
 /// Light of surfaces, as probes gather it.
 pub struct Gather<'a, A> {
     world: World<'a, A>,
-    mesh: SurfaceMesh,
+    /// Light that surfaces receive from each other, if any that comes by it counts.
+    mesh: Option<SurfaceMesh>,
     /// What direct light is multiplied by before k_d.
     scale: f32,
     directions: u32,
@@ -53,29 +54,29 @@ impl<'a, A: Accel> Gather<'a, A> {
         stations: &[Station],
     ) -> Result<Self, MeshError> {
         let scale = settings.shading.direct_scale();
-        let mut indirect = indirect.clone();
+        let mut gather = Self { world, mesh: None, scale, directions };
+        // The way to the probe is one of the bounces.
+        let Some(bounces) = indirect.bounces.checked_sub(1).filter(|&bounces| bounces > 0) else {
+            return Ok(gather);
+        };
+        let mut indirect = IndirectSettings { bounces, ..indirect.clone() };
         if indirect.form != IndirectForm::Surface {
             // The spacing is that of points in free space.
             indirect.points.spacing = Spacing::Auto;
         }
         let bounds = world.scene.bounds();
-        let width = surface_width(&indirect, bounds)?;
-        let mut mesh = SurfaceMesh::new(&indirect, width, scale);
+        let mut mesh = SurfaceMesh::new(&indirect, surface_width(&indirect, bounds)?, scale);
         // A view from so far away that no cell of the mesh is too wide for it.
-        let size = bounds.extent().length();
-        let eye = bounds.center() + Vec3::splat(1e3 * size);
+        let eye = bounds.center() + Vec3::splat(1e3 * bounds.extent().length());
         mesh.turn_to(SurfaceView { footprint: PixelFootprint { eye, edge: 1.0 }, height: 1 });
-        let mut gather = Self { world, mesh, scale, directions };
         let probes_per_batch = (RAYS_PER_BATCH / directions.max(1) as usize).max(1);
         for batch in stations.chunks(probes_per_batch) {
-            let ends: Vec<Vec<End>> =
+            let surfaces: Vec<Vec<SurfacePoint>> =
                 batch.par_iter().map(|station| vectorize(Look { gather: &gather, station })).collect();
-            let surfaces =
-                |ends: &'_ Vec<End>| -> Vec<SurfacePoint> { ends.iter().map(|end| end.seen.point).collect() };
-            let surfaces: Vec<Vec<SurfacePoint>> = ends.par_iter().map(surfaces).collect();
-            gather.mesh.need(world, surfaces.iter().map(|of_probe| of_probe.iter().collect()).collect());
+            mesh.need(world, surfaces.iter().map(|of_probe| of_probe.iter().collect()).collect());
         }
-        gather.mesh.evaluate(world);
+        mesh.evaluate(world);
+        gather.mesh = Some(mesh);
         Ok(gather)
     }
 
@@ -92,11 +93,12 @@ struct Look<'a, A> {
 }
 
 impl<A: Accel> NullaryFnOnce for Look<'_, A> {
-    type Output = Vec<End>;
+    type Output = Vec<SurfacePoint>;
 
     #[inline(always)]
-    fn call(self) -> Vec<End> {
-        look(self.gather, self.station, |_, _, _| {})
+    fn call(self) -> Vec<SurfacePoint> {
+        let ends = look(self.gather, self.station, |_, _, _| {});
+        ends.iter().map(|end| end.seen.point).collect()
     }
 }
 
@@ -159,7 +161,9 @@ impl<A: Accel> NullaryFnOnce for MeasureGathered<'_, A> {
         });
         let surfaces: Vec<SurfacePoint> = ends.iter().map(|end| end.seen.point).collect();
         let mut received = vec![Vec3::ZERO; ends.len()];
-        gather.mesh.illuminate(gather.world.accel, surfaces.iter(), 1.0, &mut received);
+        if let Some(mesh) = &gather.mesh {
+            mesh.illuminate(gather.world.accel, surfaces.iter(), 1.0, &mut received);
+        }
         let directions = sensor.directions(station.position, gather.directions);
         let shift = hash_to_unit_cube(station.position).z;
         let mut scratch = DirectLight::default();

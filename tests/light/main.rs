@@ -18,6 +18,7 @@ mod levels;
 mod moving;
 mod penumbra;
 mod physical;
+mod probe;
 mod real_scenes;
 mod reference;
 mod rows;
