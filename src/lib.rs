@@ -74,7 +74,7 @@ pub mod cli;
 mod color;
 #[cfg(feature = "cli")]
 pub mod crosscheck;
-// pub mod export;
+pub mod export;
 pub mod framing;
 pub mod image;
 pub mod light_mesh;

@@ -4,7 +4,9 @@ mod bench;
 mod choice;
 pub mod compare;
 mod crosscheck;
+mod display;
 mod error;
+mod export;
 pub mod gallery;
 mod generate;
 mod info;
@@ -40,6 +42,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Measure light at points, along a line, on a plane or in a grid.
     Probe(Box<probe::ProbeArgs>),
+    /// Write the mesh points of a view and their light, for ParaView and others.
+    Export(export::ExportArgs),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -74,6 +78,7 @@ impl Command {
         match self {
             Self::Render(args) => render::run(args),
             Self::Probe(args) => probe::run(args),
+            Self::Export(args) => export::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),

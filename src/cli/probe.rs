@@ -17,7 +17,7 @@ use crate::image::exr::{SampleType, encode};
 use crate::image::{ImageError, OutputFile, png};
 use crate::probe::{
     GridFile, Plane, Probe, ProbeGrid, ProbeSettings, Unit, encode_grid_bytes, encode_grid_json,
-    false_colours, line, load_probes, luminous_map, measure, measure_harmonics, write_table,
+    encode_grid_vti, false_colours, line, load_probes, luminous_map, measure, measure_harmonics, write_table,
 };
 use crate::render::Session;
 use crate::settings::Settings;
@@ -37,7 +37,7 @@ pub struct ProbeArgs {
     scene: SceneArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// File to write: .csv; of a plane also .png (false colours) or .exr (linear RGB, float); of a grid .json or .bin; may be given several times
+    /// File to write: .csv; of a plane also .png (false colours) or .exr (linear RGB, float); of a grid .json, .bin or .vti; may be given several times
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     /// Measuring points along the line, both ends included
@@ -101,6 +101,7 @@ enum Format {
     Exr,
     Json,
     Bytes,
+    Vti,
 }
 
 impl Format {
@@ -111,6 +112,7 @@ impl Format {
             "exr" => Some(Self::Exr),
             "json" => Some(Self::Json),
             "bin" => Some(Self::Bytes),
+            "vti" => Some(Self::Vti),
             _ => None,
         }
     }
@@ -123,7 +125,7 @@ impl ProbeArgs {
     /// Refuses what the declarations of the flags can't express.
     pub fn check(&self) -> Result<(), String> {
         let (known, names): (&[Format], &str) = if self.place.grid.is_some() {
-            (&[Format::Json, Format::Bytes], ".json or .bin for a grid")
+            (&[Format::Json, Format::Bytes, Format::Vti], ".json, .bin or .vti for a grid")
         } else if self.place.plane.is_some() {
             (&[Format::Csv, Format::Png, Format::Exr], ".csv, .png or .exr for a plane")
         } else {
@@ -202,7 +204,11 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
         for (format, target) in targets {
             match format {
                 Format::Bytes => target.write(&encode_grid_bytes(&file))?,
-                _ => target.write(encode_grid_json(&file).as_bytes())?,
+                Format::Vti => target.write(&encode_grid_vti(&file))?,
+                _ => {
+                    let text = encode_grid_json(&file).map_err(|error| refused(target, &error))?;
+                    target.write(text.as_bytes())?;
+                }
             }
         }
         return Ok(());

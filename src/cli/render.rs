@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::display::LiveDisplay;
 use super::error::{CommandError, Outcome};
 use super::overrides::Overrides;
 use super::partial::PartialPictures;
@@ -46,6 +47,9 @@ pub struct RenderArgs {
     /// Write the images after every step, not only after the last one
     #[arg(long)]
     pub write_partial: bool,
+    /// Show the image in the viewer tev while it is rendered; tev listens at port 14158
+    #[arg(long, value_name = "HOST:PORT")]
+    pub display_server: Option<String>,
     #[command(flatten)]
     pub overrides: Overrides,
 }
@@ -114,7 +118,10 @@ fn render_to(
     let exposure = (!bare || args.overrides.exposure.is_some()).then_some(settings.output.exposure);
     let partial =
         PartialPictures::new(&bar, if args.write_partial { targets } else { &[] }, sample_type, exposure);
-    let rendered = session.render_to(camera, &settings, &partial, &StopToken::default());
+    let server = args.display_server.as_deref();
+    let display = LiveDisplay::new(server, &args.scene.path, settings.view.resolution, args.quiet, &partial);
+    let rendered = session.render_to(camera, &settings, &display, &StopToken::default());
+    display.finish();
     partial.finish()?;
     let (image, stats) =
         rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;

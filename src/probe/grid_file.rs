@@ -1,10 +1,13 @@
 //! Spherical harmonics of a grid of probes, as files for game engines (docs/probes.md).
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use serde::Serialize;
 
 use super::harmonics::{COEFFICIENTS, COSINE_FACTORS};
 use super::probes::ProbeGrid;
+use crate::export::{ImageGrid, Values, encode_vti};
 
 /// A grid of probes with what they measured.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +39,10 @@ const FORMAT: &str = "lightmesh-sh-grid";
 const VERSION: u32 = 1;
 
 /// The grid as JSON: what the numbers mean, origin, step and counts of the grid, and for each probe nine coefficients of three channels.
-pub fn encode_grid_json(file: &GridFile) -> String {
+///
+/// # Errors
+/// Of the encoder, if any.
+pub fn encode_grid_json(file: &GridFile) -> serde_json::Result<String> {
     let coefficients = file.coefficients.iter().map(|of_probe| of_probe.map(|value| value.to_array()));
     let json = Json {
         format: FORMAT,
@@ -52,7 +58,7 @@ pub fn encode_grid_json(file: &GridFile) -> String {
         irradiance_factors: COSINE_FACTORS,
         coefficients: coefficients.collect(),
     };
-    format!("{}\n", serde_json::json!(json))
+    Ok(serde_json::to_string(&json)? + "\n")
 }
 
 /// The same as bytes, little-endian: `LMSH`, version (u32), counts (three u32), origin and step (three f32 each), and for each probe nine
@@ -66,4 +72,21 @@ pub fn encode_grid_bytes(file: &GridFile) -> Vec<u8> {
     let numbers = places.iter().chain(coefficients.iter().flatten()).flat_map(|value| value.to_array());
     bytes.extend(numbers.flat_map(f32::to_le_bytes));
     bytes
+}
+
+/// The light of a grid as a `.vti` file for ParaView: `Fluence`, and `Direction`, the mean of the directions that the light comes from, weighted by its
+/// amount, whose length is 0 for even light and 1 for that of one lamp.
+pub fn encode_grid_vti(file: &GridFile) -> Vec<u8> {
+    let ProbeGrid { origin, step, counts } = *file.grid;
+    let fluence = |of_probe: &[Vec3; COEFFICIENTS]| of_probe[0] * (4.0 * PI).sqrt();
+    let direction = |of_probe: &[Vec3; COEFFICIENTS]| {
+        let [constant, y, z, x] = [0, 1, 2, 3].map(|index| of_probe[index].element_sum());
+        // ∫ L ω over ∫ L: √(4π/3) c₁ over √4π c₀.
+        if constant > 0.0 { Vec3::new(x, y, z) / (3f32.sqrt() * constant) } else { Vec3::ZERO }
+    };
+    let arrays = [
+        ("Fluence".to_owned(), Values::Vectors(file.coefficients.iter().map(fluence).collect())),
+        ("Direction".to_owned(), Values::Vectors(file.coefficients.iter().map(direction).collect())),
+    ];
+    encode_vti(&ImageGrid { origin, step, counts }, &arrays)
 }

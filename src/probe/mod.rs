@@ -22,7 +22,7 @@ mod probes;
 mod sensor;
 mod table;
 
-pub use grid_file::{GridFile, encode_grid_bytes, encode_grid_json};
+pub use grid_file::{GridFile, encode_grid_bytes, encode_grid_json, encode_grid_vti};
 pub use harmonics::{COEFFICIENTS, COSINE_FACTORS, basis};
 pub use map::{false_colours, luminous_map};
 pub use measure::{ProbeSettings, measure, measure_harmonics};

@@ -93,6 +93,11 @@ impl LightMeshes {
         Self { direct, has_emitters: false, indirect: None, surface: None, indirect_identity: None }
     }
 
+    /// Whether emissive triangles are among the lights that the direct mesh knows.
+    pub(super) fn has_emitters(&self) -> bool {
+        self.has_emitters
+    }
+
     /// Makes the direct mesh one of these lights: it starts anew where emissive triangles are among them all at once, or no longer.
     pub(super) fn renew_lights(&mut self, lights: &PackedLights) {
         if self.has_emitters != lights.has_emitters() {

@@ -22,8 +22,8 @@ use crate::world::World;
 /// Direct light mesh: points and the field at those that are known. It belongs to one scene's geometry and to its lights'
 /// places and kinds; how surface points interpolate it is no part of it.
 pub struct DirectMesh {
-    store: PointStore,
-    field: DirectField,
+    pub(super) store: PointStore,
+    pub(super) field: DirectField,
 }
 
 /// How surface points interpolate a direct mesh.

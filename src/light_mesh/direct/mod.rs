@@ -4,6 +4,7 @@
 mod derived;
 mod estimators;
 mod field;
+mod known;
 mod mesh;
 mod refine;
 // For tests and benches only.
@@ -12,6 +13,7 @@ pub mod spherical_harmonics;
 mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;
+pub use known::KnownPoints;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};
 pub(crate) use witnesses::Witnesses;
 

@@ -114,6 +114,11 @@ impl PointSet {
         Ok(number)
     }
 
+    /// Number of the layer of a point.
+    pub(crate) fn layer_of(&self, id: u64) -> u32 {
+        (id >> LAYER_SHIFT) as u32
+    }
+
     /// Position of a point.
     pub fn position(&self, id: u64) -> Vec3 {
         let layer = &self.layers[(id >> LAYER_SHIFT) as usize];

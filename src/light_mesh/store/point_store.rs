@@ -56,6 +56,11 @@ impl PointStore {
         self.points.corners(id).map(|corners| corners.map(|corner| self.slot(corner)))
     }
 
+    /// Numbers of the layers that the known points belong to, by slot.
+    pub(crate) fn layers(&self) -> Vec<u32> {
+        self.slots.first_ids().into_iter().map(|id| self.points.layer_of(id)).collect()
+    }
+
     /// Slot of a point; `u32::MAX` where it is not known.
     #[inline(always)]
     pub(crate) fn slot(&self, id: u64) -> u32 {

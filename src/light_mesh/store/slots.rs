@@ -81,6 +81,20 @@ impl SlotTable {
         new
     }
 
+    /// The first of the ids that share each slot, by slot.
+    pub fn first_ids(&self) -> Vec<u64> {
+        let mut first = vec![u64::MAX; self.used as usize];
+        for (&brick, &entry) in &self.directory {
+            let slots = self.bricks.get(entry as usize).into_iter().flatten();
+            for (id, &slot) in (brick * 64..).zip(slots) {
+                if let Some(known) = first.get_mut(slot as usize) {
+                    *known = id.min(*known);
+                }
+            }
+        }
+        first
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         // A hash map keeps a byte per place beside key and value.
