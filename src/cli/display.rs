@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
+use super::error::describe;
 use super::progress::Reporter;
 use super::shared::QuietArgs;
 use crate::image::Image;
@@ -93,8 +94,7 @@ impl Viewer {
         let started = thread::Builder::new().name("live display".to_owned()).spawn(move || {
             if let Err(error) = send(&to_send, &address, &name, resolution) {
                 to_send.give_up();
-                reporter
-                    .line(&format!("warning: {address}: nothing is displayed any more: {}", reason(&error)));
+                reporter.line(&format!("warning: {address}: nothing is displayed: {}", reason(&error)));
             }
             to_send.give_up();
         });
@@ -111,7 +111,7 @@ impl Viewer {
 fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => "the viewer does not react".to_owned(),
-        _ => error.to_string(),
+        _ => describe(error),
     }
 }
 

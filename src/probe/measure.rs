@@ -74,8 +74,7 @@ pub fn measure(
 ) -> Result<Vec<Vec3>, RenderError> {
     let size = size_of_scene(session.scene());
     let station = |probe: &Probe| Station::new(probe.position, Sensor::of(probe), size);
-    let values = run(session, probes.iter().map(station).collect(), settings, how)?;
-    Ok(values.into_iter().map(|[value, ..]| value).collect())
+    run(session, probes.iter().map(station).collect(), settings, how, |[value, ..]| value)
 }
 
 /// Coefficients of the radiance that arrives at positions from all directions, in the basis of [`basis`](super::basis).
@@ -89,7 +88,7 @@ pub fn measure_harmonics(
     how: &ProbeSettings,
 ) -> Result<Vec<[Vec3; COEFFICIENTS]>, RenderError> {
     let station = |position: &Vec3| Station::new(*position, Sensor::Harmonics, 0.0);
-    run(session, positions.iter().map(station).collect(), settings, how)
+    run(session, positions.iter().map(station).collect(), settings, how, |values| values)
 }
 
 fn size_of_scene(scene: &Scene) -> f32 {
@@ -100,12 +99,14 @@ fn size_of_scene(scene: &Scene) -> f32 {
     bounds.min.abs().max(bounds.max.abs()).max_element() + bounds.extent().max_element()
 }
 
-fn run(
+/// Measures at all stations; `take` says what of it is kept.
+fn run<T: Send>(
     session: &Session,
     stations: Vec<Station>,
     settings: &Settings,
     how: &ProbeSettings,
-) -> Result<Vec<Values>, RenderError> {
+    take: impl Fn(Values) -> T + Sync,
+) -> Result<Vec<T>, RenderError> {
     settings.check()?;
     let world = session.world(settings);
     let directions = how.directions.clamp(1, ProbeSettings::MOST_DIRECTIONS);
@@ -123,7 +124,7 @@ fn run(
         }
         let &Station { position, origin, sensor } = station;
         vectorize(MeasureDirect { world, sensor, position, origin, values: &mut values });
-        values
+        take(values)
     };
     Ok(stations.par_iter().map(measure).collect())
 }

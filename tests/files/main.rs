@@ -4,6 +4,7 @@
 mod common;
 
 mod damaged_images;
+mod export;
 mod failed_images;
 mod formats;
 mod generate;
@@ -12,6 +13,7 @@ mod independent;
 mod malformed;
 mod obj;
 mod openexr;
+mod probe_points;
 mod round_trips;
 mod scene_file;
 mod textures;
