@@ -197,6 +197,10 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
             Some(&[a, b]) => Bounds { min: a.min(b), max: a.max(b) },
             _ => session.scene().bounds(),
         };
+        if bounds.is_empty() {
+            let problem = "holds no triangles: a grid needs --box".to_owned();
+            return Err(CommandError::Malformed { file: args.scene.path.clone(), problem });
+        }
         let grid = ProbeGrid::in_box(bounds, counts);
         let coefficients = measure_harmonics(&session, &grid.positions(), &settings, &how).map_err(failed)?;
         spinner.finish_and_clear();

@@ -56,7 +56,11 @@ impl<'a, A: Accel> Gather<'a, A> {
         let scale = settings.shading.direct_scale();
         let mut gather = Self { world, mesh: None, scale, directions };
         // The way to the probe is one of the bounces.
-        let Some(bounces) = indirect.bounces.checked_sub(1).filter(|&bounces| bounces > 0) else {
+        let Some(bounces) = indirect
+            .bounces
+            .checked_sub(1)
+            .filter(|&bounces| bounces > 0 && world.scene.triangle_count() > 0)
+        else {
             return Ok(gather);
         };
         let mut indirect = IndirectSettings { bounces, ..indirect.clone() };

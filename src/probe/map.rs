@@ -21,7 +21,9 @@ pub fn luminous_map(plane: &Plane, light: &[Vec3]) -> Result<Image, ImageError> 
 pub fn false_colours(plane: &Plane, light: &[Vec3], unit: Unit, full_scale: f32) -> Vec<[u8; 3]> {
     let colour = |light: Vec3| {
         let share = unit.lux(light) / full_scale;
-        let colour = colorous::TURBO.eval_continuous(f64::from(share.clamp(0.0, 1.0)));
+        // What is no number is dark.
+        let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
+        let colour = colorous::TURBO.eval_continuous(f64::from(share));
         [colour.r, colour.g, colour.b]
     };
     plane.image_order(light).into_iter().map(colour).collect()
