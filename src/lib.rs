@@ -55,6 +55,7 @@
 //! - [`light_mesh`]: mesh points, their values, and the estimators that interpolate them.
 //! - [`render`]: the stages, and the tracers that light meshes are measured against: `conventional`, with all shadow rays, and `reference`, a
 //!   light mesh of infinite density.
+//! - [`probe`] and [`export`]: light as numbers, at points of a caller's choice and at the mesh points that are known.
 //! - [`image`]: OpenEXR, PNG, and metrics for comparing images.
 //!
 //! The equations, the words and the limits of the method are in `docs/method.md`, which comments cite as "method §4". Bias is the price: the
@@ -74,10 +75,12 @@ pub mod cli;
 mod color;
 #[cfg(feature = "cli")]
 pub mod crosscheck;
+pub mod export;
 pub mod framing;
 pub mod image;
 pub mod light_mesh;
 pub mod lights;
+pub mod probe;
 pub mod render;
 // For tests and benches only.
 #[doc(hidden)]

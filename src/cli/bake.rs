@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{ArgAction, Args};
+use glam::Vec3;
 
 use super::error::{CommandError, Outcome};
 use super::frames::FrameArgs;
@@ -33,9 +34,9 @@ pub struct BakeArgs {
     /// Evaluate all mesh points of direct light in the whole scene
     #[arg(long)]
     whole: bool,
-    /// Evaluate all mesh points of direct light in a box, given by two corners; may be given several times
-    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse::bounds)]
-    boxes: Vec<Bounds>,
+    /// Evaluate all mesh points of direct light in a box between two corners; may be given several times
+    #[arg(long = "box", value_name = "X,Y,Z", num_args = 2, action = ArgAction::Append, allow_hyphen_values = true, value_parser = parse::point)]
+    corners: Vec<Vec3>,
     #[command(flatten)]
     quiet: QuietArgs,
     #[command(flatten)]
@@ -74,7 +75,9 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     }
     let named = args.camera.iter().map(|name| camera_of(&args.scene, &cameras, Some(name)));
     let mut seen = named.collect::<Result<Vec<_>, _>>()?;
-    let mut boxes = args.boxes.clone();
+    let (corners, _) = args.corners.as_chunks::<2>();
+    let mut boxes: Vec<Bounds> =
+        corners.iter().map(|&[a, b]| Bounds { min: a.min(b), max: a.max(b) }).collect();
     if args.whole {
         boxes.push(session.scene().bounds());
     }
@@ -141,19 +144,4 @@ fn stopped(
     session.update_light_meshes(&args.output, settings)?;
     let kept = format!("{} has what was evaluated; the same command goes on", args.output.display());
     Ok(CommandError::Interrupted { exit_code, kept })
-}
-
-#[cfg(test)]
-mod tests {
-    use glam::Vec3;
-
-    use super::*;
-
-    /// Corners may be given in any order.
-    #[test]
-    fn boxes_have_two_corners() {
-        let bounds = parse::bounds("1,2,3,0,5,-1").unwrap();
-        assert_eq!((bounds.min, bounds.max), (Vec3::new(0.0, 2.0, -1.0), Vec3::new(1.0, 5.0, 3.0)));
-        assert!(parse::bounds("1,2,3").is_err() && parse::bounds("1,2,3,4,5,x").is_err());
-    }
 }

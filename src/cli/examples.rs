@@ -51,7 +51,7 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
         &["bake"],
         &[
             example("lightmesh bake scene.toml -o field.lmesh", "what the scene's cameras see"),
-            example("lightmesh bake scene.toml -o box.lmesh --box 0,0,0,1,1,1", "all mesh points in a box"),
+            example("lightmesh bake scene.toml -o box.lmesh --box 0,0,0 1,1,1", "all mesh points in a box"),
             example("lightmesh render scene.toml --light-mesh field.lmesh -o picture.png", "a picture by it"),
         ],
     ),
@@ -61,6 +61,37 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
             example("lightmesh render scene.toml --tile 1/2 -o t1.exr", "one half of a picture"),
             example("lightmesh render scene.toml --tile 2/2 -o t2.exr", "the other"),
             example("lightmesh merge t1.exr t2.exr -o whole.exr", "the whole"),
+        ],
+    ),
+    (
+        &["probe"],
+        &[
+            example(
+                "lightmesh probe scene.toml --points desks.csv -o desks_lux.csv",
+                "lux at points of a file",
+            ),
+            example(
+                "lightmesh probe scene.toml --line 0,0.8,0 1,0.8,0 --samples 11 --normal 0,1,0 -o walk.csv",
+                "along a line",
+            ),
+            example(
+                "lightmesh probe scene.toml --plane 0,0.1,1 1,0,0 0,0,-1 --resolution 20x12 -o lux.png",
+                "on a plane, in false colours",
+            ),
+            example(
+                "lightmesh probe scene.toml --grid 4x2x4 -o probes.json",
+                "spherical harmonics for a game engine",
+            ),
+        ],
+    ),
+    (
+        &["export"],
+        &[
+            example("lightmesh bake scene.toml -o field.lmesh", "mesh points"),
+            example(
+                "lightmesh export field.lmesh -o field.vtu -o field.ply",
+                "the same for ParaView and others",
+            ),
         ],
     ),
     (

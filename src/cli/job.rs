@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use super::display::LiveDisplay;
 use super::error::CommandError;
 use super::interrupt::Interrupt;
 use super::partial::PartialPictures;
@@ -84,11 +85,14 @@ impl Job<'_> {
         let bar = reporter.bar("rendering");
         let (width, height) = settings.view.resolution;
         bar.set(0, u64::from(width) * u64::from(height));
-        let sinks: Vec<&dyn TileSink> = vec![&bar, &partial, &tiles];
+        let server = args.display_server.as_deref();
+        let display = LiveDisplay::new(server, &args.scene.path, settings.view.resolution, args.quiet);
+        let sinks: Vec<&dyn TileSink> = vec![&bar, &partial, &tiles, &display];
         reporter.detail(&format!("camera: {camera:?}"));
         reporter.detail(&format!("settings: {settings:?}"));
         let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
         let rendered = session.render_to(camera, settings, &Sinks(sinks), &interrupt.stop);
+        display.finish();
         bar.finish();
         if let (Err(RenderError::Stopped), Some(exit_code)) = (&rendered, interrupt.exit_code()) {
             args.light_mesh.update(session, settings)?;

@@ -6,9 +6,11 @@ mod choice;
 pub mod compare;
 mod completions;
 mod crosscheck;
+mod display;
 mod error;
 mod events;
 mod examples;
+mod export;
 mod frames;
 pub mod gallery;
 mod generate;
@@ -22,6 +24,7 @@ mod merge;
 mod overrides;
 mod parse;
 mod partial;
+mod probe;
 mod progress;
 mod ready;
 mod region;
@@ -61,6 +64,10 @@ enum Command {
     Bake(Box<bake::BakeArgs>),
     /// Put parts of an image together that `render --tile` or `--crop` wrote.
     Merge(merge::MergeArgs),
+    /// Measure light at points, along a line, on a plane or in a grid.
+    Probe(Box<probe::ProbeArgs>),
+    /// Write mesh points and their light, for ParaView and others.
+    Export(export::ExportArgs),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -96,9 +103,12 @@ impl Cli {
 
     /// Refuses what the declarations of the flags can't express.
     fn checked(self) -> Result<Self, clap::Error> {
-        if let Command::Bench(args) = &self.command {
-            args.check().map_err(|text| command().error(UsageError::ArgumentConflict, text))?;
-        }
+        let checked = match &self.command {
+            Command::Bench(args) => args.check(),
+            Command::Probe(args) => args.check(),
+            _ => Ok(()),
+        };
+        checked.map_err(|text| command().error(UsageError::ArgumentConflict, text))?;
         Ok(self)
     }
 }
@@ -109,6 +119,8 @@ impl Command {
             Self::Render(args) => render::run(args),
             Self::Bake(args) => bake::run(args),
             Self::Merge(args) => merge::run(args),
+            Self::Probe(args) => probe::run(args),
+            Self::Export(args) => export::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),

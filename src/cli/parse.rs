@@ -3,9 +3,8 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{UVec3, Vec3};
 
-use crate::Bounds;
 use crate::image::MAX_PIXELS;
 use crate::settings::{MAX_EXPOSURE, MAX_FILTER_WIDTH, Radius, Spacing};
 
@@ -67,16 +66,17 @@ pub fn point(text: &str) -> Result<Vec3, String> {
     }
 }
 
-/// A box, by two of its corners.
-pub fn bounds(text: &str) -> Result<Bounds, String> {
-    let numbers: Result<Vec<f32>, _> =
-        text.split(',').map(|text| number(text, "a number", |_| true)).collect();
-    match numbers.as_deref() {
-        Ok(&[x0, y0, z0, x1, y1, z1]) => {
-            let (a, b) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
-            Ok(Bounds { min: a.min(b), max: a.max(b) })
+/// Three numbers of things along the axes, together at most 2²⁴.
+pub fn counts(text: &str) -> Result<UVec3, String> {
+    const MOST: u64 = 1 << 24;
+    let counts: Option<Vec<u32>> = text.split(['x', 'X']).map(|text| text.parse().ok()).collect();
+    match counts.as_deref() {
+        Some(&[x, y, z]) if ![x, y, z].contains(&0) => {
+            let all = u64::from(x).checked_mul(u64::from(y)).and_then(|xy| xy.checked_mul(u64::from(z)));
+            let small = all.is_some_and(|all| all <= MOST);
+            if small { Ok(UVec3::new(x, y, z)) } else { Err(format!("more than {MOST} points")) }
         }
-        _ => Err("two corners, such as 0,0,0,4,2.5,6".to_owned()),
+        _ => Err("three numbers above 0, such as 16x8x16".to_owned()),
     }
 }
 
@@ -206,6 +206,17 @@ mod tests {
         assert_eq!((time_limit("1h"), time_limit("0")), (seconds(3600.0), Ok(TimeLimit(None))));
         for wrong in ["-1", "1d", "1e300h", "s", "inf", ""] {
             assert!(time_limit(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// Counts whose product leaves 64 bits are too many, too.
+    #[test]
+    fn counts_end_where_memory_would() {
+        assert_eq!(counts("256x256x256"), Ok(UVec3::splat(256)));
+        for wrong in
+            ["257x256x256", "4294967295x4294967295x4294967295", "0x1x1", "1x1", "1x1x1x1", "-1x1x1", ""]
+        {
+            assert!(counts(wrong).is_err(), "{wrong}");
         }
     }
 

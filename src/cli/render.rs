@@ -51,6 +51,9 @@ pub struct RenderArgs {
     pub region: RegionArgs,
     #[command(flatten)]
     pub light_mesh: LightMeshArgs,
+    /// Show the image in the viewer tev while it is rendered; tev listens at port 14158
+    #[arg(long, value_name = "HOST:PORT")]
+    pub display_server: Option<String>,
     #[command(flatten)]
     pub overrides: Overrides,
 }

@@ -27,7 +27,7 @@
 //! `direct_light`, `series` and `packed_colour` are what the last two have in common.
 
 pub mod direct;
-mod direct_light;
+pub(crate) mod direct_light;
 pub mod file;
 pub mod indirect;
 pub(crate) mod leaks;

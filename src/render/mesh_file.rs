@@ -9,7 +9,7 @@ use super::known_view::KnownView;
 use super::meshes::LightMeshes;
 use crate::Bounds;
 use crate::image::{ImageError, OutputFile};
-use crate::light_mesh::direct::DirectMesh;
+use crate::light_mesh::direct::{DirectMesh, KnownPoints};
 use crate::light_mesh::file::{Differences, MeshFile, MeshFileError, SectionsWriter};
 use crate::light_mesh::indirect::IndirectMesh;
 use crate::light_mesh::points::MeshError;
@@ -212,6 +212,16 @@ impl LightMeshes {
         drop(lock);
         Ok(bytes.len() as u64)
     }
+}
+
+/// The points of direct light of a file, with their light when the file was written; needs no scene.
+///
+/// # Errors
+/// See [`MeshFileError`].
+pub fn read_known_points(path: &Path) -> Result<KnownPoints, MeshFileError> {
+    let file = MeshFile::open(path)?;
+    let (bounds, lights) = (file.value::<Identity>(IDENTITY)?.bounds, file.value::<PackedLights>(LIGHTS)?);
+    Ok(DirectMesh::restore(bounds, &lights, &file)?.known(&lights))
 }
 
 /// A file beside a file of light meshes, which whoever changes that one holds: the other is replaced, and can't be held itself.

@@ -108,6 +108,11 @@ impl LightMeshes {
         }
     }
 
+    /// Whether emissive triangles are among the lights that the direct mesh knows.
+    pub(super) fn has_emitters(&self) -> bool {
+        self.has_emitters
+    }
+
     /// Makes the direct mesh one of these lights: it starts anew where emissive triangles are among them all at once, or no longer.
     pub(super) fn renew_lights(&mut self, lights: &PackedLights) {
         if self.has_emitters != lights.has_emitters() {
@@ -300,7 +305,10 @@ const CELLS_ALONG_DIAGONAL: f32 = 60.0;
 const MOST_CELLS_ALONG_DIAGONAL: f32 = 2000.0;
 
 /// Width of the cells of a surface mesh.
-fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> Result<f32, MeshError> {
+///
+/// # Errors
+/// [`MeshError::TooFine`].
+pub(crate) fn surface_width(settings: &IndirectSettings, bounds: Bounds) -> Result<f32, MeshError> {
     let diagonal = bounds.extent().length();
     match settings.points.spacing {
         Spacing::Auto => Ok(diagonal / CELLS_ALONG_DIAGONAL),

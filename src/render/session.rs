@@ -15,7 +15,7 @@ use super::stats::RenderStats;
 use crate::Bounds;
 use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
-use crate::light_mesh::direct::{Basis, DirectEvaluation, DirectField};
+use crate::light_mesh::direct::{Basis, DirectEvaluation, DirectField, KnownPoints};
 use crate::light_mesh::file::{MeshFile, MeshFileError};
 use crate::lights::EmissiveTriangles;
 use crate::scene::{Camera, Scene, SceneError};
@@ -70,6 +70,19 @@ impl Session {
     /// Its acceleration structure.
     pub fn backend(&self) -> &Backend {
         &self.backend
+    }
+
+    /// The scene with what was built from it, and the lights that the settings ask for.
+    pub(crate) fn world(&self, settings: &Settings) -> World<'_, Backend> {
+        let Self { scene, backend, lights, emissive, .. } = self;
+        World { accel: backend, scene, lights: lights.of_settings(settings), emissive }
+    }
+
+    /// The points of the direct light mesh that are known by now, with their light; costs no ray.
+    pub fn known_points(&mut self) -> KnownPoints {
+        let Self { lights, meshes, .. } = self;
+        let with_emitters = lights.with_emitters.as_ref().filter(|_| meshes.has_emitters());
+        meshes.direct.known(with_emitters.unwrap_or(&lights.plain))
     }
 
     /// Changes the intensity E_i of a light; 0 switches it off. What mesh points see stays known, and what a ball's geometry shows stays as it is.

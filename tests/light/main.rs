@@ -20,6 +20,7 @@ mod mesh_file;
 mod moving;
 mod penumbra;
 mod physical;
+mod probe;
 mod real_scenes;
 mod reference;
 mod rows;

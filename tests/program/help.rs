@@ -37,7 +37,12 @@ fn stderr(output: &Output) -> String {
 /// A folder with what examples speak of.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("model.obj", MODEL), ("scene.toml", SCENE), ("gallery.toml", LIST)] {
+    for (name, text) in [
+        ("model.obj", MODEL),
+        ("scene.toml", SCENE),
+        ("gallery.toml", LIST),
+        ("desks.csv", "0 0 0.1 0 0 1\n"),
+    ] {
         fs::write(folder.path().join(name), text).expect("writable");
     }
     for name in ["a.png", "b.png"] {

@@ -4,6 +4,7 @@
 mod derived;
 mod estimators;
 mod field;
+mod known;
 mod mesh;
 mod moved;
 mod refine;
@@ -15,6 +16,7 @@ mod stored_bits;
 mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;
+pub use known::KnownPoints;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};
 pub use moved::KeptBits;
 pub(crate) use moved::Motion;

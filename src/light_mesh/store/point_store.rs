@@ -83,6 +83,18 @@ impl PointStore {
         self.points.corners(id).map(|corners| corners.map(|corner| self.slot(corner)))
     }
 
+    /// Numbers of the layers that the known points belong to, by slot.
+    pub(crate) fn layers(&self) -> Vec<u32> {
+        let mut layers = vec![0; self.positions.len()];
+        for (id, slot) in self.known() {
+            layers
+                .get_mut(slot as usize)
+                .into_iter()
+                .for_each(|layer| *layer = PointSet::layer_of(id) as u32);
+        }
+        layers
+    }
+
     /// Slot of a point; `u32::MAX` where it is not known.
     #[inline(always)]
     pub(crate) fn slot(&self, id: u64) -> u32 {

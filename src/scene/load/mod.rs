@@ -25,4 +25,5 @@ pub use bare::{OpenedScene, open_scene};
 pub use error::{LoadError, Skipped, Warning};
 pub use format::{ModelFormat, load_model};
 pub use model::{Model, Part};
+pub(crate) use points::{finite_number, number_rows};
 pub use scene_file::{LoadedScene, load_scene_file};

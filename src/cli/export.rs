@@ -1,0 +1,126 @@
+//! `lightmesh export`: the known points of a light mesh with their light, for other programs.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::error::{CommandError, Outcome};
+use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
+use crate::accel::Backend;
+use crate::export::{PointField, encode_ply, encode_vtu};
+use crate::framing::choose_view;
+use crate::image::{ImageError, OutputFile};
+use crate::light_mesh::direct::KnownPoints;
+use crate::render::{Session, read_known_points};
+use crate::settings::Integrator;
+
+/// What `export` takes.
+///
+/// Points are those of the direct light mesh. Arrays: DirectLight and Unoccluded (RGB), VisibleLights, Layer.
+#[derive(Args, Debug)]
+pub struct ExportArgs {
+    /// Light mesh that `lightmesh bake` wrote (.lmesh), or a scene or model, of which the points are evaluated that its cameras need
+    #[arg(value_name = "FILE")]
+    input: PathBuf,
+    /// File to write, .vtu (VTK, ParaView) or .ply; may be given several times
+    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    /// Of a scene: camera whose points are exported, by name; may be repeated [default: all]
+    #[arg(long, value_name = "NAME")]
+    camera: Vec<String>,
+    #[command(flatten)]
+    quiet: QuietArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+}
+
+/// How points are written.
+#[derive(Clone, Copy)]
+enum Format {
+    Vtu,
+    Ply,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, ImageError> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("vtu") => Ok(Self::Vtu),
+            Some("ply") => Ok(Self::Ply),
+            _ => Err(ImageError::Write {
+                path: path.to_owned(),
+                cause: "the name of exported points ends in .vtu or .ply".to_owned(),
+            }),
+        }
+    }
+
+    fn encode(self, field: &PointField) -> Vec<u8> {
+        match self {
+            Self::Vtu => encode_vtu(field),
+            Self::Ply => encode_ply(field),
+        }
+    }
+}
+
+/// Writes the points.
+///
+/// # Errors
+/// See [`CommandError`]; then no output file has changed.
+pub fn run(args: &ExportArgs) -> Result<Outcome, CommandError> {
+    let target = |path: &PathBuf| Ok((Format::of(path)?, OutputFile::new(path)?));
+    let targets = args.output.iter().map(target).collect::<Result<Vec<_>, ImageError>>()?;
+    let reporter = args.quiet.reporter();
+    let is_mesh = args.input.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("lmesh"));
+    let known = args
+        .threads
+        .pool()?
+        .install(|| if is_mesh { baked_points(&args.input) } else { points_of_views(args) })?;
+    let field = PointField::of_known(known);
+    reporter.line(&format!("{} points", field.positions.len()));
+    for (format, target) in targets {
+        target.write(&format.encode(&field))?;
+    }
+    Ok(Outcome::Passed)
+}
+
+/// The points of a file.
+fn baked_points(path: &Path) -> Result<KnownPoints, CommandError> {
+    read_known_points(path).map_err(|source| CommandError::LightMesh { file: path.to_owned(), source })
+}
+
+/// The points that cameras of a scene need.
+fn points_of_views(args: &ExportArgs) -> Result<KnownPoints, CommandError> {
+    let reporter = args.quiet.reporter();
+    let scene = SceneArgs { path: args.input.clone() };
+    let opened = scene.open(&reporter)?;
+    let choice = args.backend.backend;
+    args.memory.check(&scene, &opened.loaded.scene, &[choice])?;
+    let chosen = Backend::build(choice, &opened.loaded.scene)?;
+    let view = choose_view(&opened, &chosen.backend);
+    let loaded = view.complete(opened).loaded;
+    let path = &args.input;
+    if let Some(name) =
+        args.camera.iter().find(|name| !loaded.cameras.iter().any(|camera| camera.name == **name))
+    {
+        let names = loaded.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(CommandError::NoSuchCamera { scene: path.clone(), name: name.clone(), names });
+    }
+    let mut settings = loaded.settings;
+    settings.shading.integrator = Integrator::LightMesh;
+    settings.mesh.indirect = None;
+    settings.limits.max_error = None;
+    let mut session = Session::with_backend(loaded.scene, chosen.backend)
+        .map_err(|source| CommandError::Session { scene: path.clone(), source })?;
+    let asked = |name: &String| args.camera.is_empty() || args.camera.contains(name);
+    for camera in loaded.cameras.iter().filter(|camera| asked(&camera.name)) {
+        let spinner = reporter.spinner("evaluating");
+        let rendered = session.render(camera, &settings);
+        spinner.finish_and_clear();
+        rendered.map_err(|source| CommandError::Render { scene: path.clone(), source })?;
+    }
+    Ok(session.known_points())
+}
