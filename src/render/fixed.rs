@@ -5,6 +5,7 @@ use super::error::RenderError;
 use super::film::TileSink;
 use super::frame::{Frame, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
+use super::layers::LayerCollector;
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::stats::{RenderStats, timed};
@@ -22,12 +23,13 @@ pub(super) struct View<'a, A> {
     pub camera: &'a Camera,
     pub sink: &'a dyn TileSink,
     pub stop: &'a StopToken,
+    pub layers: Option<&'a LayerCollector>,
 }
 
 impl<A: Accel> View<'_, A> {
     /// The view, cut up.
     pub(super) fn frame<'a>(&'a self, settings: &'a Settings) -> Frame<'a, A> {
-        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop)
+        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop).with_layers(self.layers)
     }
 
     pub(super) fn render_fixed(

@@ -6,6 +6,7 @@ use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::fixed::View;
 use super::frame::StopToken;
+use super::layers::LayerCollector;
 use super::meshes::LightMeshes;
 use super::stats::RenderStats;
 use crate::accel::{Accel, Backend, BackendChoice};
@@ -128,10 +129,27 @@ impl Session {
         sink: &dyn TileSink,
         stop: &StopToken,
     ) -> Result<(Image, RenderStats), RenderError> {
+        self.render_layers(camera, settings, sink, stop, None)
+    }
+
+    /// Renders a view as [`Session::render_to`] does, and hands its layers to a collector.
+    ///
+    /// With layers the image is their sum, and differs from one without by rounding.
+    ///
+    /// # Errors
+    /// As [`Session::render_to`].
+    pub fn render_layers(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        sink: &dyn TileSink,
+        stop: &StopToken,
+        layers: Option<&LayerCollector>,
+    ) -> Result<(Image, RenderStats), RenderError> {
         let Self { scene, backend, lights, emissive, meshes } = self;
         let lights = lights.of_settings(settings);
         let world = World { accel: &*backend, scene, lights, emissive };
-        render_world(world, camera, settings, meshes, sink, stop)
+        render_world(world, camera, settings, meshes, sink, stop, layers)
     }
 
     /// DirectLight of eq. (1) at positions in free space, linear RGB, with the visibility of every light traced; needs no
@@ -164,7 +182,7 @@ pub fn render(
     let mut meshes = LightMeshes::new(scene.bounds());
     let lights = lights.of_settings(settings);
     let world = World { accel: backend, scene, lights, emissive: &emissive };
-    render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
+    render_world(world, camera, settings, &mut meshes, &(), &StopToken::default(), None)
 }
 
 fn render_world<A: Accel>(
@@ -174,8 +192,9 @@ fn render_world<A: Accel>(
     meshes: &mut LightMeshes,
     sink: &dyn TileSink,
     stop: &StopToken,
+    layers: Option<&LayerCollector>,
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
     camera.validate()?;
-    View { world, camera, sink, stop }.render(settings, meshes)
+    View { world, camera, sink, stop, layers }.render(settings, meshes)
 }

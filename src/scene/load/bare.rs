@@ -44,6 +44,7 @@ impl OpenedScene {
             lights,
             falloff: Falloff::InverseSquare,
             background: Vec3::ZERO,
+            ..Scene::default()
         };
         let mut settings = Settings::default();
         settings.shading.lambertian = true;
