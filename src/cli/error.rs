@@ -84,6 +84,12 @@ pub enum CommandError {
         /// Those that exist.
         names: String,
     },
+    /// Layers are asked for, and no output can hold them.
+    #[error("{}: layers need an output that ends in .exr", file.display())]
+    Layers {
+        /// The first output.
+        file: PathBuf,
+    },
     /// Threads can't be started.
     #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -7,8 +7,10 @@ mod crosscheck;
 mod error;
 pub mod gallery;
 mod generate;
+mod image_info;
 mod info;
 mod init;
+mod layers;
 mod overrides;
 mod parse;
 mod partial;
@@ -37,7 +39,7 @@ struct Cli {
 enum Command {
     /// Render a scene file to an image.
     Render(Box<render::RenderArgs>),
-    /// Report what a scene file or model holds.
+    /// Report what a scene file, model or EXR image holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
     Init(init::InitArgs),

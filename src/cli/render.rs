@@ -1,11 +1,12 @@
 //! `lightmesh render`: a scene file to an image.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::layers::{self, LayerArgs};
 use super::overrides::Overrides;
 use super::partial::PartialPictures;
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
@@ -47,6 +48,8 @@ pub struct RenderArgs {
     #[arg(long)]
     pub write_partial: bool,
     #[command(flatten)]
+    pub layers: LayerArgs,
+    #[command(flatten)]
     pub overrides: Overrides,
 }
 
@@ -67,6 +70,7 @@ fn render_to(
     stats_target: Option<&OutputFile>,
 ) -> Result<(), CommandError> {
     let start = Instant::now();
+    let collector = args.layers.collector(targets)?;
     let reporter = args.quiet.reporter();
     let mut seconds = Seconds::default();
 
@@ -114,7 +118,8 @@ fn render_to(
     let exposure = (!bare || args.overrides.exposure.is_some()).then_some(settings.output.exposure);
     let partial =
         PartialPictures::new(&bar, if args.write_partial { targets } else { &[] }, sample_type, exposure);
-    let rendered = session.render_to(camera, &settings, &partial, &StopToken::default());
+    let rendered =
+        session.render_layers(camera, &settings, &partial, &StopToken::default(), collector.as_ref());
     partial.finish()?;
     let (image, stats) =
         rendered.map_err(|source| CommandError::Render { scene: args.scene.path.clone(), source })?;
@@ -146,10 +151,11 @@ fn render_to(
     let options = ImageOptions {
         sample_type,
         exposure: settings.output.exposure,
-        metadata: metadata(backend, &settings, &stats),
+        metadata: metadata(backend, &args.scene.path, &settings, &stats),
     };
+    let layers = collector.as_ref().and_then(|collector| collector.take(&image));
     for target in targets {
-        target.write(&image, &options)?;
+        layers::write(target, &image, (width, height), layers.as_ref(), &options)?;
     }
     seconds.write = stage.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
@@ -186,14 +192,27 @@ fn render_to(
 }
 
 /// What is stored in the image: nothing that differs from run to run.
-fn metadata(backend: &Backend, settings: &Settings, stats: &RenderStats) -> Vec<(String, String)> {
+fn metadata(
+    backend: &Backend,
+    scene: &Path,
+    settings: &Settings,
+    stats: &RenderStats,
+) -> Vec<(String, String)> {
     let entry = |key: &str, value: String| (key.to_owned(), value);
-    vec![
+    // The name alone: where the scene lies is a matter of the machine.
+    let scene = scene.file_name().unwrap_or_default().to_string_lossy();
+    let mut entries = vec![
         entry("Software", format!("lightmesh {}", env!("CARGO_PKG_VERSION"))),
         entry("lightmesh:backend", backend.to_string()),
         entry("lightmesh:settings", format!("{settings:?}")),
         entry("lightmesh:shadow_rays", stats.rays.shadow.to_string()),
-    ]
+        entry("lightmesh:scene", scene.into_owned()),
+        entry("lightmesh:exposure", settings.output.exposure.to_string()),
+    ];
+    if let Some(found) = stats.accuracy.and_then(|accuracy| accuracy.found) {
+        entries.push(entry("lightmesh:error", found.error.to_string()));
+    }
+    entries
 }
 
 /// One line on what was done.

@@ -83,7 +83,7 @@ impl Builder {
             materials,
             lights,
             falloff,
-            background: Vec3::ZERO,
+            ..Scene::default()
         }
     }
 }

@@ -12,6 +12,7 @@ mod estimators;
 mod furnace;
 mod hybrid;
 mod lamps;
+mod layers;
 mod lazy;
 mod leaks;
 mod levels;

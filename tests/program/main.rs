@@ -10,6 +10,7 @@ mod choice;
 mod command_line;
 mod compare;
 mod gallery;
+mod layers;
 mod memory;
 mod same_bytes;
 mod views;
