@@ -150,6 +150,12 @@ pub enum CommandError {
         /// Number of its frames.
         count: i64,
     },
+    /// Layers are asked for, and no output can hold them.
+    #[error("{}: layers need an output that ends in .exr", file.display())]
+    Layers {
+        /// The first output.
+        file: PathBuf,
+    },
     /// Threads can't be started.
     #[error("cannot start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),

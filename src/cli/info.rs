@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CommandError, Outcome};
+use super::image_info::ImageInfo;
 use super::shared::{QuietArgs, SceneArgs};
 use crate::accel::{Footprint, MemoryEstimate};
 use crate::scene::LightKind;
@@ -113,6 +114,15 @@ impl Info {
 /// # Errors
 /// See [`CommandError`].
 pub fn run(args: &InfoArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
+    if ImageInfo::is_for(&args.scene.path) {
+        let info = ImageInfo::read(&args.scene.path)?;
+        if args.json {
+            writeln!(out, "{}", serde_json::json!(info))?;
+        } else {
+            info.print(out)?;
+        }
+        return Ok(Outcome::Passed);
+    }
     let info = Info::new(&args.scene.read(&args.quiet.reporter())?);
     if args.json {
         writeln!(out, "{}", serde_json::json!(info))?;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::display::LiveDisplay;
 use super::error::CommandError;
 use super::interrupt::Interrupt;
+use super::layers;
 use super::partial::PartialPictures;
 use super::progress::Reporter;
 use super::ready::ReadyScene;
@@ -17,7 +18,7 @@ use super::written::{Written, is_written};
 use crate::accel::Accel;
 use crate::image::output::{ImageOptions, OutputTarget};
 use crate::image::{Image, exr::SampleType, tone::auto_exposure};
-use crate::render::{RenderError, RenderStats, TileSink};
+use crate::render::{LayerCollector, LayerImage, RenderError, RenderStats, TileSink};
 use crate::scene::Camera;
 
 /// What renders one image after the other.
@@ -42,15 +43,17 @@ impl Job<'_> {
         let Self { args, reporter, .. } = *self;
         let targets = args.frames.targets(&args.output, number)?;
         let stats_target = args.frames.file(args.stats.as_deref(), number)?;
-        let written = Written::of(&self.ready.session, camera, &self.ready.settings);
+        let written = Written::of(&args.scene.path, &self.ready.session, camera, &self.ready.settings);
         if args.resume && targets.iter().all(|target| is_written(target.path(), &written)) {
             let names: Vec<String> =
                 targets.iter().map(|target| target.path().display().to_string()).collect();
             reporter.line(&format!("note: {}: finished, stays as it is", names.join(", ")));
             return Ok(0);
         }
-        let (image, stats) = self.render(camera, &targets, &written)?;
-        let stats_file = self.write(&targets, &written, &image, stats)?;
+        let collector = args.layers.collector(&targets)?;
+        let (image, stats) = self.render(camera, &targets, &written, collector.as_ref())?;
+        let layers = collector.and_then(|collector| collector.take(&image));
+        let stats_file = self.write(&targets, &written, &image, layers.as_ref(), stats)?;
         if let Some(target) = stats_target {
             target.write(format!("{}\n", serde_json::json!(stats_file)).as_bytes())?;
         }
@@ -70,6 +73,7 @@ impl Job<'_> {
         camera: &Camera,
         targets: &[OutputTarget],
         written: &Written,
+        layers: Option<&LayerCollector>,
     ) -> Result<(Image, RenderStats), CommandError> {
         let Self { args, reporter, ref mut ready, .. } = *self;
         let ReadyScene { session, settings, bare, .. } = ready;
@@ -91,7 +95,7 @@ impl Job<'_> {
         reporter.detail(&format!("camera: {camera:?}"));
         reporter.detail(&format!("settings: {settings:?}"));
         let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
-        let rendered = session.render_to(camera, settings, &Sinks(sinks), &interrupt.stop);
+        let rendered = session.render_layers(camera, settings, &Sinks(sinks), &interrupt.stop, layers);
         display.finish();
         bar.finish();
         if let (Err(RenderError::Stopped), Some(exit_code)) = (&rendered, interrupt.exit_code()) {
@@ -116,6 +120,7 @@ impl Job<'_> {
         targets: &[OutputTarget],
         written: &Written,
         image: &Image,
+        layers: Option<&LayerImage>,
         stats: RenderStats,
     ) -> Result<StatsFile, CommandError> {
         let Self { args, reporter, start, ref mut ready } = *self;
@@ -152,7 +157,7 @@ impl Job<'_> {
             metadata: written.metadata(settings.output.exposure, &stats),
         };
         for target in targets {
-            target.write(image, &options)?;
+            layers::write(target, image, layers, &options)?;
         }
         remove_partial(targets, written);
         seconds.write = stage.elapsed().as_secs_f64();

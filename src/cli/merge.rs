@@ -10,7 +10,7 @@ use crate::image::exr::{MergeError, decode_channels, encode_channels, merge};
 use crate::image::{DecodeError, ImageError, OutputFile};
 
 /// Attributes that are the same in all parts of a picture.
-const IDENTITY: [&str; 3] = ["Software", "lightmesh:scene", "lightmesh:settings"];
+const IDENTITY: [&str; 3] = ["Software", "lightmesh:scene_hash", "lightmesh:settings"];
 
 /// What `merge` takes.
 #[derive(Args, Debug)]

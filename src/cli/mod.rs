@@ -14,10 +14,12 @@ mod export;
 mod frames;
 pub mod gallery;
 mod generate;
+mod image_info;
 mod info;
 mod init;
 mod interrupt;
 mod job;
+mod layers;
 mod light_mesh;
 mod man;
 mod merge;
@@ -68,7 +70,7 @@ enum Command {
     Probe(Box<probe::ProbeArgs>),
     /// Write mesh points and their light, for ParaView and others.
     Export(export::ExportArgs),
-    /// Report what a scene file or model holds.
+    /// Report what a scene file, model or EXR image holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
     Init(init::InitArgs),

@@ -8,6 +8,7 @@ use clap::Args;
 use super::error::{CommandError, Outcome};
 use super::frames::{self, FrameArgs};
 use super::job::Job;
+use super::layers::LayerArgs;
 use super::light_mesh::LightMeshArgs;
 use super::overrides::Overrides;
 use super::ready::{camera_of, ready_scene};
@@ -54,6 +55,8 @@ pub struct RenderArgs {
     /// Show the image in the viewer tev while it is rendered; tev listens at port 14158
     #[arg(long, value_name = "HOST:PORT")]
     pub display_server: Option<String>,
+    #[command(flatten)]
+    pub layers: LayerArgs,
     #[command(flatten)]
     pub overrides: Overrides,
 }

@@ -16,6 +16,8 @@ const PART: &str = "lightmesh:part";
 #[derive(Clone, Debug)]
 pub struct Written {
     backend: String,
+    /// Name of the scene's file.
+    scene_name: String,
     scene: SceneFingerprint,
     settings: String,
     /// Of scene, camera, settings and backend: equal ones give equal pixels.
@@ -26,7 +28,7 @@ pub struct Written {
 
 impl Written {
     /// By a session, of a view.
-    pub fn of(session: &Session, camera: &Camera, settings: &Settings) -> Self {
+    pub fn of(file: &Path, session: &Session, camera: &Camera, settings: &Settings) -> Self {
         let backend: &Backend = session.backend();
         let scene = SceneFingerprint::of(session.scene());
         // The same for all parts of an image, and however it is written.
@@ -41,22 +43,36 @@ impl Written {
                 format!("{},{},{right},{bottom}", window.x, window.y)
             }
         };
-        Self { backend: backend.to_string(), scene, settings: format!("{of_whole:?}"), render, part }
+        // The name alone: where the scene lies is a matter of the machine.
+        let scene_name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Self {
+            backend: backend.to_string(),
+            scene_name,
+            scene,
+            settings: format!("{of_whole:?}"),
+            render,
+            part,
+        }
     }
 
     /// What is stored in the image: nothing that differs from run to run.
     pub fn metadata(&self, exposure: f32, stats: &RenderStats) -> Vec<(String, String)> {
         let entry = |key: &str, value: String| (key.to_owned(), value);
-        vec![
+        let mut entries = vec![
             entry("Software", format!("lightmesh {}", env!("CARGO_PKG_VERSION"))),
             entry("lightmesh:backend", self.backend.clone()),
-            entry("lightmesh:scene", self.scene.to_string()),
+            entry("lightmesh:scene", self.scene_name.clone()),
+            entry("lightmesh:scene_hash", self.scene.to_string()),
             entry("lightmesh:settings", self.settings.clone()),
             entry(RENDER, self.render.to_string()),
             entry(PART, self.part.clone()),
             entry("lightmesh:exposure", exposure.to_string()),
             entry("lightmesh:shadow_rays", stats.rays.shadow.to_string()),
-        ]
+        ];
+        if let Some(found) = stats.accuracy.and_then(|accuracy| accuracy.found) {
+            entries.push(entry("lightmesh:error", found.error.to_string()));
+        }
+        entries
     }
 }
 

@@ -8,7 +8,7 @@ use super::kinds::KindLanes;
 use super::shape::{LampShape, ball_parts, lamp_numbers};
 use super::visibility::VisibilityBits;
 use crate::accel::Coherence;
-use crate::scene::{Light, LightKind};
+use crate::scene::{Light, LightKind, Scene};
 use crate::simd::{LANES, Lanes};
 
 /// Sixteen lights.
@@ -134,6 +134,17 @@ impl Loose<'_> {
             Self::Light(..) => 2,
             Self::Emitter(_) => 3,
         }
+    }
+
+    /// Numbers of the groups of the lights that stand for a scene's.
+    pub fn groups_of(scene: &Scene) -> Vec<u16> {
+        // The parts of a light follow each other, from number 0 on.
+        let mut begun = 0;
+        let group = |light: Loose| {
+            begun += usize::from(!matches!(light, Loose::Light(_, LampShape::Ball { part: (1.., _), .. })));
+            scene.light_groups.of(begun.saturating_sub(1))
+        };
+        Loose::of(&scene.lights).map(group).collect()
     }
 
     /// The lights that stand for some lights.

@@ -20,6 +20,8 @@ pub struct PackedLights {
     falloff: Falloff,
     count: usize,
     has_emitters: bool,
+    /// By chunk, numbers of the lights' groups; empty if there are none.
+    groups: Vec<[u16; LANES]>,
 }
 
 impl PackedLights {
@@ -38,15 +40,16 @@ impl PackedLights {
             0.0
         };
         let lights = Loose::of(&scene.lights).chain(emitters.iter().map(Loose::Emitter));
-        Self::packed(lights.collect(), scene.falloff, reach)
+        Self::packed(lights.collect(), scene.falloff, reach, &Loose::groups_of(scene))
     }
 
     /// Table of lights; occlusion rays to directional lights are `reach` long.
     pub fn new(lights: &[Light], falloff: Falloff, reach: f32) -> Self {
-        Self::packed(Loose::of(lights).collect(), falloff, reach)
+        Self::packed(Loose::of(lights).collect(), falloff, reach, &[])
     }
 
-    fn packed(lights: Vec<Loose>, falloff: Falloff, reach: f32) -> Self {
+    /// `groups` has the groups of the first lights; all others have none.
+    fn packed(lights: Vec<Loose>, falloff: Falloff, reach: f32, groups: &[u16]) -> Self {
         let mut order: Vec<usize> = (0..lights.len()).collect();
         let mut bounds = crate::Bounds::EMPTY;
         lights.iter().for_each(|light| bounds.extend(light.position()));
@@ -58,7 +61,20 @@ impl PackedLights {
         };
         let chunks = order.chunks(LANES).map(chunk).collect();
         let has_emitters = lights.iter().any(|light| matches!(light, Loose::Emitter(_)));
-        Self { chunks, falloff, count: lights.len(), has_emitters }
+        let has_groups = groups.iter().any(|&group| group != 0);
+        let groups = |members: &[usize]| {
+            let mut of_chunk = [0; LANES];
+            let found = members.iter().map(|&light| groups.get(light).copied().unwrap_or(0));
+            of_chunk.iter_mut().zip(found).for_each(|(to, group)| *to = group);
+            of_chunk
+        };
+        let groups = if has_groups { order.chunks(LANES).map(groups).collect() } else { Vec::new() };
+        Self { chunks, falloff, count: lights.len(), has_emitters, groups }
+    }
+
+    /// Number of the group of a light, 0 for the default one.
+    pub(crate) fn group(&self, index: usize, light: usize) -> usize {
+        self.groups.get(index).map_or(0, |groups| usize::from(groups[light]))
     }
 
     /// Whether light of emissive triangles is among them.

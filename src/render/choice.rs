@@ -99,7 +99,7 @@ pub(super) fn choose<A: Accel>(
     let mut shade = stats.seconds.shade;
     let tried: Vec<ShadeCounters> = timed(&mut shade, || {
         let shade = |(tile, paths): (&Tile, &TilePaths)| {
-            integrator.shade(tile, paths, &mut vec![Vec3::ZERO; paths.vertices.len()])
+            integrator.shade(tile, paths, &mut vec![Vec3::ZERO; paths.vertices.len()], None)
         };
         tiles.par_iter().zip(&paths).map(shade).collect()
     });

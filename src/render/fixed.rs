@@ -6,6 +6,7 @@ use super::film::TileSink;
 use super::frame::{Frame, Purpose, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
 use super::known_view::KnownView;
+use super::layers::LayerCollector;
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::settled::Settled;
@@ -28,12 +29,14 @@ pub(super) struct View<'a, A> {
     pub known: Option<&'a KnownView>,
     /// What is made of it.
     pub purpose: Purpose,
+    pub layers: Option<&'a LayerCollector>,
 }
 
 impl<A: Accel> View<'_, A> {
     /// The view, cut up.
     pub(super) fn frame<'a>(&'a self, settings: &'a Settings) -> Frame<'a, A> {
         Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop, self.purpose)
+            .with_layers(self.layers)
     }
 
     pub(super) fn render_fixed(

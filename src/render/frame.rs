@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::error::RenderError;
 use super::film::{TileSink, put_tile, resolve, resolve_block};
+use super::layers::{LayerCollector, LayerRecord, LightParts};
 use super::paths::TilePaths;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};
@@ -24,8 +25,15 @@ pub trait BlockIntegrator: Sync {
     /// Evaluates what the surface points of a block need.
     fn evaluate(&mut self, paths: &[TilePaths], stats: &mut RenderStats);
 
-    /// Shades the vertices of a tile: fills `light` with one E for each, such that k_d·E is the light sent back.
-    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters;
+    /// Shades the vertices of a tile: fills `light`, which is 0, with one E for each, such that k_d·E is the light sent back. Where `parts`
+    /// are asked for, that is their direct light alone, and the rest of it goes there.
+    fn shade(
+        &self,
+        tile: &Tile,
+        paths: &TilePaths,
+        light: &mut [Vec3],
+        parts: Option<&mut LightParts>,
+    ) -> ShadeCounters;
 }
 
 /// Stops a render between two tiles. Clones stop the same renders.
@@ -98,6 +106,8 @@ pub struct Frame<'a, A> {
     sink: &'a dyn TileSink,
     stop: &'a StopToken,
     purpose: Purpose,
+    /// Who collects layers, if anyone does.
+    layers: Option<&'a LayerCollector>,
     /// Camera paths that were traced already, by block.
     kept: Vec<Vec<TilePaths>>,
 }
@@ -117,12 +127,17 @@ impl<'a, A: Accel> Frame<'a, A> {
         let most = if samples == 1 { BLOCK_SAMPLES } else { BLOCK_MERGED_SAMPLES };
         let block_pixels = view.block_samples.unwrap_or(most) / samples;
         let blocks = blocks(view.resolution, block_pixels);
-        Self { world, view, camera, blocks, sink, stop, purpose, kept: Vec::new() }
+        Self { world, view, camera, blocks, sink, stop, purpose, layers: None, kept: Vec::new() }
     }
 
     /// Tells the sink that a picture begins, by settings that leave nothing open.
     pub(super) fn begin(&self, settings: &Settings) {
         self.sink.begin(settings);
+    }
+
+    /// The same, with layers for a collector beside the picture.
+    pub fn with_layers(self, layers: Option<&'a LayerCollector>) -> Self {
+        Self { layers, ..self }
     }
 
     /// Traces the camera paths of a block; what `paths` held before is gone, but its memory is used again.
@@ -133,7 +148,7 @@ impl<'a, A: Accel> Frame<'a, A> {
         stats: &mut RenderStats,
     ) -> Result<(), RenderError> {
         self.stop.check()?;
-        paths.resize_with(block.len(), TilePaths::default);
+        paths.resize_with(block.len(), || TilePaths::new(self.layers.is_some()));
         timed(&mut stats.seconds.paths, || {
             let tiles = block.par_iter().zip(&mut *paths).with_max_len(TILES_PER_TASK);
             tiles.for_each(|(tile, paths)| trace_paths(self.world, &self.camera, self.view, tile, paths));
@@ -182,6 +197,7 @@ impl<'a, A: Accel> Frame<'a, A> {
         let mut image = Image::new(width, height)?;
         self.leave_out(&mut image);
         let mut kept = std::mem::take(&mut self.kept).into_iter();
+        let record = self.layers.map(|layers| layers.begin(self.world.scene, self.world.lights));
         // Kept from block to block: the first use of memory costs a sixth of the camera paths.
         let mut paths: Vec<TilePaths> = Vec::new();
         for block in &self.blocks {
@@ -196,25 +212,30 @@ impl<'a, A: Accel> Frame<'a, A> {
             }
             let mut shade = stats.seconds.shade;
             let counters = timed(&mut shade, || {
-                let counters = self.shade(integrator, block, &mut paths);
-                resolve_block(block, &paths, self.view.samples_per_pixel, &mut image);
+                let counters = self.shade(integrator, block, &mut paths, record.as_ref());
+                resolve_block(block, &paths, self.summed_samples(), &mut image);
                 counters
             });
             stats.seconds.shade = shade;
             counters.into_iter().for_each(|counters| stats.add_shading(counters));
             self.stop.check()?;
         }
+        if let Some((layers, record)) = self.layers.zip(record) {
+            layers.end(&image, record);
+        }
         Ok(image)
     }
 
     /// Leaves out the tiles that nobody asked for, and those whose pixels are known, which are put into the image.
     fn leave_out(&mut self, image: &mut Image) {
-        let Self { view, sink, .. } = *self;
+        let Self { view, sink, layers, .. } = *self;
         let mut is_left = |tile: &Tile| {
             if view.crop.is_some_and(|crop| !crop.meets(&tile.window())) {
                 return false;
             }
-            let known = sink.known(tile).filter(|pixels| pixels.len() == tile.pixels());
+            // Of their layers nothing is known.
+            let known = if layers.is_some() { None } else { sink.known(tile) };
+            let known = known.filter(|pixels| pixels.len() == tile.pixels());
             known.iter().for_each(|pixels| {
                 put_tile(tile, pixels, image);
                 sink.tile(tile, pixels);
@@ -234,22 +255,46 @@ impl<'a, A: Accel> Frame<'a, A> {
         }
     }
 
+    /// Samples that the radiance of shaded pixels is the sum of: with layers it is their mean.
+    fn summed_samples(&self) -> u32 {
+        if self.layers.is_some() { 1 } else { self.view.samples_per_pixel }
+    }
+
     /// Shades a block; tiles that are left when the render is stopped stay as they are.
     fn shade(
         &self,
         integrator: &impl BlockIntegrator,
         block: &[Tile],
         paths: &mut [TilePaths],
+        record: Option<&LayerRecord>,
     ) -> Vec<ShadeCounters> {
         let shade = |(tile, paths): (&Tile, &mut TilePaths)| {
             if self.stop.is_stopped() {
                 return ShadeCounters::default();
             }
-            let counters = shade_tile(integrator, tile, paths);
-            self.sink.tile(tile, &resolve(&paths.radiance, self.view.samples_per_pixel));
+            let counters = match record {
+                Some(record) => self.shade_layers(integrator, tile, paths, record),
+                None => shade_tile(integrator, tile, paths),
+            };
+            self.sink.tile(tile, &resolve(&paths.radiance, self.summed_samples()));
             counters
         };
         block.par_iter().zip(paths).with_max_len(TILES_PER_TASK).map(shade).collect()
+    }
+
+    /// [`shade_tile`] with layers.
+    fn shade_layers(
+        &self,
+        integrator: &impl BlockIntegrator,
+        tile: &Tile,
+        paths: &mut TilePaths,
+        record: &LayerRecord,
+    ) -> ShadeCounters {
+        let mut light = vec![Vec3::ZERO; paths.vertices.len()];
+        let mut parts = record.parts(paths.vertices.len());
+        let counters = integrator.shade(tile, paths, &mut light, Some(&mut parts));
+        record.add(tile, paths, &light, &parts, self.view.samples_per_pixel);
+        counters
     }
 }
 
@@ -257,7 +302,7 @@ impl<'a, A: Accel> Frame<'a, A> {
 /// weight · (Emiss + k_d · I), whose first part is there already.
 pub fn shade_tile(integrator: &impl BlockIntegrator, tile: &Tile, paths: &mut TilePaths) -> ShadeCounters {
     let mut light = vec![Vec3::ZERO; paths.vertices.len()];
-    let counters = integrator.shade(tile, paths, &mut light);
+    let counters = integrator.shade(tile, paths, &mut light, None);
     for (vertex, light) in paths.vertices.iter().zip(light) {
         paths.radiance[vertex.pixel as usize] += vertex.reflectance * light;
     }

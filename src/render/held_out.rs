@@ -135,7 +135,7 @@ fn shade_part(
     samples: u32,
 ) -> (Vec<Vec3>, u64) {
     let mut light = vec![Vec3::ZERO; paths.vertices.len()];
-    let counters = integrator.shade(tile, paths, &mut light);
+    let counters = integrator.shade(tile, paths, &mut light, None);
     let mut radiance = paths.radiance.clone();
     for (vertex, light) in paths.vertices.iter().zip(light) {
         radiance[vertex.pixel as usize] += vertex.reflectance * light;

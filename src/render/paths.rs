@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::layers::FirstHits;
 use crate::scene::SurfacePoint;
 
 /// A surface that camera paths of a pixel meet, and how much of its illumination reaches the pixel.
@@ -33,9 +34,16 @@ pub struct TilePaths {
     pub camera_rays: u64,
     /// Mirror reflections traced.
     pub reflection_rays: u64,
+    /// What camera rays meet first, if layers are made of it.
+    pub first: Option<Box<FirstHits>>,
 }
 
 impl TilePaths {
+    /// No paths; tracing some keeps what layers need, if that is asked for.
+    pub(super) fn new(with_layers: bool) -> Self {
+        Self { first: with_layers.then(Box::default), ..Self::default() }
+    }
+
     /// The vertices' surface points.
     pub fn surfaces(&self) -> impl Iterator<Item = &SurfacePoint> {
         self.vertices.iter().map(|vertex| &vertex.surface)

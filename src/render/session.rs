@@ -8,6 +8,7 @@ use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::fixed::View;
 use super::frame::{Purpose, StopToken};
+use super::layers::LayerCollector;
 use super::mesh_file::{MeshScene, RestoredMeshes, WriteMeshesError};
 use super::meshes::LightMeshes;
 use super::scene_lights::SceneLights;
@@ -125,10 +126,27 @@ impl Session {
         sink: &dyn TileSink,
         stop: &StopToken,
     ) -> Result<(Image, RenderStats), RenderError> {
+        self.render_layers(camera, settings, sink, stop, None)
+    }
+
+    /// Renders a view as [`Session::render_to`] does, and hands its layers to a collector.
+    ///
+    /// With layers the image is their sum, and differs from one without by rounding.
+    ///
+    /// # Errors
+    /// As [`Session::render_to`].
+    pub fn render_layers(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        sink: &dyn TileSink,
+        stop: &StopToken,
+        layers: Option<&LayerCollector>,
+    ) -> Result<(Image, RenderStats), RenderError> {
         let Self { scene, backend, lights, emissive, meshes } = self;
         let lights = lights.of_settings(settings);
         let world = World { accel: &*backend, scene, lights, emissive };
-        let shown = Shown { camera, sink, stop, purpose: Purpose::Image };
+        let shown = Shown { camera, sink, stop, layers, purpose: Purpose::Image };
         render_world(world, shown, settings, meshes)
     }
 
@@ -146,7 +164,7 @@ impl Session {
         let Self { scene, backend, lights, emissive, meshes } = self;
         let lights = lights.of_settings(settings);
         let world = World { accel: &*backend, scene, lights, emissive };
-        let shown = Shown { camera, sink, stop, purpose: Purpose::Meshes };
+        let shown = Shown { camera, sink, stop, layers: None, purpose: Purpose::Meshes };
         Ok(render_world(world, shown, settings, meshes)?.1)
     }
 
@@ -231,7 +249,8 @@ pub fn render(
     let mut meshes = LightMeshes::new(scene.bounds());
     let lights = lights.of_settings(settings);
     let world = World { accel: backend, scene, lights, emissive: &emissive };
-    let shown = Shown { camera, sink: &(), stop: &StopToken::default(), purpose: Purpose::Image };
+    let shown =
+        Shown { camera, sink: &(), stop: &StopToken::default(), layers: None, purpose: Purpose::Image };
     render_world(world, shown, settings, &mut meshes)
 }
 
@@ -240,6 +259,7 @@ struct Shown<'a> {
     camera: &'a Camera,
     sink: &'a dyn TileSink,
     stop: &'a StopToken,
+    layers: Option<&'a LayerCollector>,
     purpose: Purpose,
 }
 
@@ -250,11 +270,11 @@ fn render_world<A: Accel>(
     meshes: &mut LightMeshes,
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
-    let Shown { camera, sink, stop, purpose } = shown;
+    let Shown { camera, sink, stop, layers, purpose } = shown;
     camera.validate()?;
     let known = meshes.known_view(camera, settings).cloned();
     let settled = known.as_ref().map(|known| known.settled.settings(settings));
-    let view = View { world, camera, sink, stop, known: known.as_ref(), purpose };
+    let view = View { world, camera, sink, stop, known: known.as_ref(), layers, purpose };
     let (image, mut stats) = view.render(settled.as_ref().unwrap_or(settings), meshes)?;
     if let Some(known) = known {
         stats.accuracy = known.accuracy;

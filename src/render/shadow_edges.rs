@@ -6,11 +6,12 @@
 
 use glam::Vec3;
 
+use super::layers::GroupLight;
 use super::paths::{PathVertex, TilePaths};
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{PackedLights, VisibilityBits};
-use crate::simd::LANES;
+use crate::lights::{PackedLights, Visibility, VisibilityBits, expand_bits};
+use crate::simd::{LANES, Lanes};
 
 /// Which lights the vertices of a tile see.
 pub(super) struct TileVisibility {
@@ -52,12 +53,43 @@ impl TileVisibility {
         &self.seen[vertices.start * self.chunks..vertices.end * self.chunks]
     }
 
+    /// Adds the light that each group of lights gives the vertices. Lights that are settled count half: how much of them is part of the light
+    /// is not kept, and too little to matter.
+    #[inline(always)]
+    pub fn add_by_group(&self, lights: &PackedLights, vertices: &[PathVertex], groups: &mut GroupLight) {
+        for (number, vertex) in vertices.iter().enumerate() {
+            let settled = self.settled.get(number * self.chunks..).unwrap_or_default();
+            groups.add(lights, number, vertex, SeenAndSettled { seen: self.seen(number), settled });
+        }
+    }
+
     /// Settles some lights of a chunk for some vertices.
     pub fn settle(&mut self, vertices: std::ops::Range<usize>, index: usize, lights: VisibilityBits) {
         self.settled.resize(self.seen.len(), 0);
         for vertex in vertices {
             self.settled[vertex * self.chunks + index] |= lights;
         }
+    }
+}
+
+/// The lights that a vertex sees, and those that are settled there, if there are any, by chunk.
+struct SeenAndSettled<'a> {
+    seen: &'a [VisibilityBits],
+    settled: &'a [VisibilityBits],
+}
+
+impl Visibility for SeenAndSettled<'_> {
+    #[inline(always)]
+    fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
+        let (seen, settled) = (self.seen[index], self.settled.get(index).copied().unwrap_or(0));
+        if seen | settled == 0 {
+            return None;
+        }
+        let mut visible = expand_bits(seen);
+        for (lane, visible) in visible.iter_mut().enumerate() {
+            *visible = if settled >> lane & 1 == 1 { 0.5 } else { *visible };
+        }
+        Some(visible)
     }
 }
 
@@ -73,8 +105,9 @@ const FEW: u32 = 4;
 const LEAST_SHARE: f32 = 1.0 / 96.0;
 
 /// Finds out what part of the lights at edges of shadows the vertices of a tile see, and corrects their light, which is to be
-/// multiplied by `scale`. Returns the number of rays.
+/// multiplied by `scale`, and with it that of `groups`, which is not. Returns the number of rays.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 pub(super) fn smooth_shadow_edges<A: Accel>(
     accel: &A,
     lights: &PackedLights,
@@ -83,6 +116,7 @@ pub(super) fn smooth_shadow_edges<A: Accel>(
     visibility: &TileVisibility,
     scale: f32,
     light: &mut [Vec3],
+    mut groups: Option<&mut GroupLight>,
 ) -> u64 {
     let TileVisibility { chunks, seen, settled } = visibility;
     if paths.origins.is_empty() || *chunks == 0 {
@@ -116,7 +150,7 @@ pub(super) fn smooth_shadow_edges<A: Accel>(
             left &= left - 1;
             // What lies beyond the border of the tile is not known.
             edges.find_at_border(of, &surfaces.at_border, &mut at_edge);
-            edges.smooth(of, &at_edge, light);
+            edges.smooth(of, &at_edge, light, groups.as_deref_mut());
         }
     }
     edges.rays
@@ -238,7 +272,13 @@ struct Edges<'a, A> {
 impl<A: Accel> Edges<'_, A> {
     /// Smooths the edges of one light.
     #[inline(always)]
-    fn smooth(&mut self, of: ChunkLight, at_edge: &[VisibilityBits], light: &mut [Vec3]) {
+    fn smooth(
+        &mut self,
+        of: ChunkLight,
+        at_edge: &[VisibilityBits],
+        light: &mut [Vec3],
+        mut groups: Option<&mut GroupLight>,
+    ) {
         let (index, number) = of;
         let intensity = Vec3::from(self.lights.intensity(index, number));
         self.asked.clear();
@@ -264,7 +304,11 @@ impl<A: Accel> Edges<'_, A> {
             // What is known already is a sample more, which counts where there are few.
             let known = if asked.rays < FEW { 1.0 } else { 0.0 };
             let part = (asked.seeing as f32 + known * before) / (asked.rays as f32 + known);
-            light[vertex] = (light[vertex] + intensity * (asked.factor * (part - before))).max(Vec3::ZERO);
+            let change = intensity * (asked.factor * (part - before));
+            light[vertex] = (light[vertex] + change).max(Vec3::ZERO);
+            if let Some(groups) = &mut groups {
+                groups.change(self.lights, vertex, of, change);
+            }
         }
     }
 

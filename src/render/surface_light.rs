@@ -7,6 +7,7 @@ use pulp::NullaryFnOnce;
 
 use super::error::RenderError;
 use super::frame::{BlockIntegrator, Frame};
+use super::layers::LightParts;
 use super::paths::TilePaths;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::Tile;
@@ -79,9 +80,16 @@ impl<I: BlockIntegrator, A: Accel> BlockIntegrator for WithSurfaceLight<'_, I, A
         self.direct.evaluate(paths, stats);
     }
 
-    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
-        let mut counters = self.direct.shade(tile, paths, light);
+    fn shade(
+        &self,
+        tile: &Tile,
+        paths: &TilePaths,
+        light: &mut [Vec3],
+        mut parts: Option<&mut LightParts>,
+    ) -> ShadeCounters {
+        let mut counters = self.direct.shade(tile, paths, light, parts.as_deref_mut());
         if let Some(surface) = &self.surface {
+            let light = parts.map_or(light, |parts| &mut parts.indirect);
             counters.shadow_rays += vectorize(Add { surface, paths, light });
         }
         counters

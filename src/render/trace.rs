@@ -77,6 +77,9 @@ fn trace_tile<A: Accel>(
     paths.radiance.resize(tile.pixels(), Vec3::ZERO);
     paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
     paths.reflection_rays = 0;
+    if let Some(first) = &mut paths.first {
+        first.start(camera, tile.pixels());
+    }
     let World { accel, scene, .. } = world;
     let merger = SampleMerger::new(camera.footprint(), tile.pixels(), samples);
     let mut tracer = Tracer { accel, scene, paths, merger, reflections: Vec::new(), view };
@@ -97,6 +100,10 @@ fn trace_tile<A: Accel>(
             let pixels = square.iter().map(|&(_, _, pixel)| pixel);
             tracer.weaken(pixels, samples as f32 / (samples + more) as f32, first);
         }
+    }
+    let TilePaths { first, radiance, vertices, .. } = &mut *tracer.paths;
+    if let Some(first) = first {
+        first.end_camera_rays(radiance, vertices.len());
     }
     let mut wave = std::mem::take(&mut tracer.reflections);
     let mut depth = 2;
@@ -243,6 +250,9 @@ impl<A: Accel> Tracer<'_, A> {
         let reflectance = seen.diffuse * samples as f32;
         let emission = seen.emission * samples as f32;
         self.paths.radiance[pixel as usize] += emission;
+        if let Some(first) = &mut self.paths.first {
+            first.add(self.scene, pixel, &hit, &seen, samples);
+        }
         self.merger.add(Seen { surface, reflectance, emission, pixel, samples }, origins, self.paths);
         true
     }
@@ -256,17 +266,21 @@ impl<A: Accel> Tracer<'_, A> {
     /// Takes up what a ray found.
     #[inline(always)]
     fn arrive(&mut self, pending: &Pending, hit: Option<Hit>, depth: u32) {
-        let seen = self.first_visible(&pending.ray, hit);
-        let radiance = &mut self.paths.radiance[pending.pixel as usize];
-        let Some(seen) = seen else {
-            *radiance += pending.weight * self.scene.background;
-            return;
-        };
-        let emission = pending.weight * seen.emission;
-        *radiance += emission;
+        let found = self.first_visible(&pending.ray, hit);
+        let pixel = pending.pixel;
+        let emission = pending.weight * found.map_or(self.scene.background, |(seen, _)| seen.emission);
+        self.paths.radiance[pixel as usize] += emission;
+        if let Some(first) = &mut self.paths.first {
+            match found {
+                _ if depth > 1 => first.reflect(pixel, emission),
+                Some((seen, hit)) => first.add(self.scene, pixel, &hit, &seen, 1),
+                None => first.miss(pixel),
+            }
+        }
+        let Some((seen, _)) = found else { return };
         let surface = seen.point;
         let reflectance = pending.weight * seen.diffuse;
-        let seen_once = Seen { surface, reflectance, emission, pixel: pending.pixel, samples: 1 };
+        let seen_once = Seen { surface, reflectance, emission, pixel, samples: 1 };
         self.merger.add(seen_once, [surface.ray_origin()], self.paths);
         let weight = pending.weight * seen.specular;
         if self.is_mirrored(weight, depth) {
@@ -278,22 +292,19 @@ impl<A: Accel> Tracer<'_, A> {
             } else {
                 direction.reflect(surface.geometric_normal)
             };
-            self.reflections.push(Pending {
-                ray: Ray::new(surface.ray_origin(), direction),
-                weight,
-                pixel: pending.pixel,
-            });
+            self.reflections.push(Pending { ray: Ray::new(surface.ray_origin(), direction), weight, pixel });
         }
     }
 
-    /// The first surface on a ray that is not a culled back face (method §7).
+    /// The first surface on a ray that is not a culled back face (method §7), and where it was hit.
     #[inline(always)]
-    fn first_visible(&self, ray: &Ray, mut hit: Option<Hit>) -> Option<Interaction> {
+    fn first_visible(&self, ray: &Ray, mut hit: Option<Hit>) -> Option<(Interaction, Hit)> {
         let mut ray = *ray;
         for _ in 0..MAX_PASSES {
-            let seen = self.scene.interaction(hit.as_ref()?, ray.direction);
+            let found = hit?;
+            let seen = self.scene.interaction(&found, ray.direction);
             if !seen.culled {
-                return Some(seen);
+                return Some((seen, found));
             }
             let surface = seen.point;
             // On behind the surface, which is the far side of the normal that faces the viewer.

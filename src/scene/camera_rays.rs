@@ -72,6 +72,11 @@ impl CameraRays {
         Ray::new(self.origin, self.forward + self.right * at.x + self.down * at.y)
     }
 
+    /// The view direction, of unit length.
+    pub(crate) fn forward(&self) -> Vec3 {
+        self.forward
+    }
+
     /// Where all rays start.
     pub fn origin(&self) -> Vec3 {
         self.origin

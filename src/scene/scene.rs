@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 
 use super::light::{Falloff, Light};
+use super::light_groups::LightGroups;
 use super::material::Material;
 use super::mesh::{Instance, TriangleMesh};
 use crate::Bounds;
@@ -34,6 +35,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Point lights.
     pub lights: Vec<Light>,
+    /// The groups that some of them belong to.
+    pub light_groups: LightGroups,
     /// How light falls off with distance, φ1 of eq. (1).
     pub falloff: Falloff,
     /// Radiance of rays that leave the scene, linear RGB.

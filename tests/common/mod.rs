@@ -25,7 +25,7 @@ use lightmesh::scene::{
     TriangleMesh,
 };
 use lightmesh::settings::{Integrator, Settings};
-use lightmesh::{Bounds, World};
+use lightmesh::World;
 
 /// Triangles by hand, with a material each.
 #[derive(Default)]
@@ -83,8 +83,7 @@ impl Builder {
             materials,
             lights,
             falloff,
-            background: Vec3::ZERO,
-            extent: Bounds::EMPTY,
+            ..Scene::default()
         }
     }
 }

@@ -104,8 +104,7 @@ fn pictures_stand_upright_and_alpha_masks_let_sight_and_light_pass() {
             materials: model.materials,
             lights: vec![light(eye, Vec3::ONE)],
             falloff: Falloff::None,
-            background: Vec3::ZERO,
-            extent: lightmesh::Bounds::EMPTY,
+            ..Scene::default()
         };
         // The square fills the middle half of the picture: its quarters' middles are 10 pixels from the centre.
         let camera = camera(eye, Vec3::ZERO, 2.0 * (2.0f32 / 4.0).atan().to_degrees());

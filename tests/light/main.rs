@@ -13,6 +13,7 @@ mod frames;
 mod furnace;
 mod hybrid;
 mod lamps;
+mod layers;
 mod lazy;
 mod leaks;
 mod levels;

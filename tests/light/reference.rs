@@ -45,8 +45,7 @@ fn half_plane() -> Scene {
         materials: vec![Material { diffuse: Vec3::ONE, ..Material::default() }],
         lights: vec![Light::point(LIGHT, Vec3::ONE)],
         falloff: Falloff::None,
-        background: Vec3::ZERO,
-        extent: lightmesh::Bounds::EMPTY,
+        ..Scene::default()
     }
 }
 

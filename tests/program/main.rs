@@ -13,6 +13,7 @@ mod display;
 mod frames;
 mod gallery;
 mod help;
+mod layers;
 mod memory;
 mod pipeline;
 mod probe;

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use ::exr::prelude::f16;
 
 use super::SampleType;
+use crate::image;
 
 /// The channels of an EXR file of one part.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,6 +98,16 @@ impl Window {
     /// Number of pixels.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+/// As far as the format's signed numbers reach.
+impl TryFrom<image::Window> for Window {
+    type Error = std::num::TryFromIntError;
+
+    fn try_from(window: image::Window) -> Result<Self, Self::Error> {
+        let image::Window { x, y, width, height } = window;
+        Ok(Self { x: x.try_into()?, y: y.try_into()?, width, height })
     }
 }
 

@@ -38,9 +38,7 @@ pub fn encode_part(
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>> {
     let beyond = || Error::Invalid("a part beyond the picture".into());
-    let start = |at: u32| i32::try_from(at).map_err(|_| beyond());
-    let image::Window { x, y, width, height } = window;
-    let mut file = ChannelImage::new(display, Window { x: start(x)?, y: start(y)?, width, height });
+    let mut file = ChannelImage::new(display, Window::try_from(window).map_err(|_| beyond())?);
     for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
         let values = part.pixels().iter().map(|pixel| pixel[index]);
         file.channels.push(Channel::new(name, Samples::of(sample_type, values)));

@@ -9,7 +9,7 @@ use super::spherical_harmonics;
 use crate::light_mesh::leaks::{amounts_differ, lights_differ};
 use crate::light_mesh::lookup::Differ;
 use crate::light_mesh::points::Neighbours;
-use crate::lights::{PackedLights, Unoccluded, Visibility, VisibilityBits};
+use crate::lights::{PackedGroups, PackedLights, Unoccluded, Visibility, VisibilityBits};
 use crate::scene::SurfacePoint;
 use crate::settings::Estimator;
 use crate::simd::{LANES, Lanes};
@@ -65,6 +65,21 @@ impl<'a> FieldEstimator<'a> {
                 spherical_harmonics::irradiance(&sums, surface.shading_normal) * scale
             }
         }
+    }
+
+    /// Adds to `sums` what the lights of each group give a surface point by the estimator `per-light`, whichever this is: of the others
+    /// groups have no sums of their own.
+    #[inline(always)]
+    pub(crate) fn add_by_group(
+        &self,
+        surface: &SurfacePoint,
+        points: &Neighbours,
+        groups: &PackedGroups,
+        sums: &mut [Vec3],
+    ) {
+        let scale = 1.0 / points.total_weight();
+        let visibility = MeanVisibility { estimator: self, points, scale };
+        groups.add_irradiance(self.lights, surface, visibility, sums);
     }
 
     /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.

@@ -14,7 +14,7 @@ use crate::light_mesh::lookup::{Lookup, LookupScratch};
 use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointPacket, PointSet};
 use crate::light_mesh::slot::UNKNOWN;
 use crate::light_mesh::store::{NeededPoints, PointMask, PointStore};
-use crate::lights::PackedLights;
+use crate::lights::{PackedGroups, PackedLights};
 use crate::scene::SurfacePoint;
 use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
 use crate::simd::{LANES, horizontal_extremes, horizontal_sums};
@@ -216,6 +216,22 @@ impl DirectView<'_> {
         let Self { lookup, estimator } = self;
         lookup.find(accel, surface, scratch, estimator);
         estimator.estimate(surface, &scratch.points)
+    }
+
+    /// Adds to `sums` what the lights of each group give a surface point whose illumination is known: no ray of it counts again.
+    #[inline(always)]
+    pub(crate) fn add_by_group<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+        groups: &PackedGroups,
+        sums: &mut [Vec3],
+    ) {
+        let counted = (scratch.rays, scratch.fallbacks);
+        self.lookup.find(accel, surface, scratch, &self.estimator);
+        (scratch.rays, scratch.fallbacks) = counted;
+        self.estimator.add_by_group(surface, &scratch.points, groups, sums);
     }
 
     /// [`DirectView::illumination`] of a surface point that is one of several in a row of the same normal.

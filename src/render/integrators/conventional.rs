@@ -8,6 +8,7 @@ use crate::accel::Accel;
 use crate::light_mesh::indirect::IndirectView;
 use crate::lights::VisibilityBits;
 use crate::render::frame::BlockIntegrator;
+use crate::render::layers::LightParts;
 use crate::render::paths::TilePaths;
 use crate::render::shadow_edges::{TileVisibility, smooth_shadow_edges};
 use crate::render::stats::{RenderStats, ShadeCounters};
@@ -29,25 +30,32 @@ pub struct ConventionalIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ConventionalIntegrator<'_, A> {
     fn evaluate(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
-        vectorize(Shade { integrator: self, tile, paths, light })
+    fn shade(
+        &self,
+        tile: &Tile,
+        paths: &TilePaths,
+        light: &mut [Vec3],
+        parts: Option<&mut LightParts>,
+    ) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, paths, light, parts })
     }
 }
 
 /// Shading of a tile, as work for the best instruction set.
-struct Shade<'a, A> {
+struct Shade<'a, 'p, A> {
     integrator: &'a ConventionalIntegrator<'a, A>,
     tile: &'a Tile,
     paths: &'a TilePaths,
     light: &'a mut [Vec3],
+    parts: Option<&'a mut LightParts<'p>>,
 }
 
-impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
+impl<A: Accel> NullaryFnOnce for Shade<'_, '_, A> {
     type Output = ShadeCounters;
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let Self { integrator, tile, paths, light } = self;
+        let Self { integrator, tile, paths, light, mut parts } = self;
         let ConventionalIntegrator { world: World { accel, lights, .. }, scale, indirect } = integrator;
         let mut shadow_rays = 0;
         let mut visibility = TileVisibility::new(paths.vertices.len(), lights);
@@ -70,10 +78,15 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
             let points = first..first + members.len();
             light_of_seen(lights, members, visibility.rows(points.clone()), &mut light[points]);
         }
-        shadow_rays += smooth_shadow_edges(*accel, lights, tile, paths, &visibility, *scale, light);
+        let mut groups = parts.as_mut().and_then(|parts| parts.groups.as_mut());
+        if let Some(groups) = &mut groups {
+            visibility.add_by_group(lights, &paths.vertices, groups);
+        }
+        shadow_rays += smooth_shadow_edges(*accel, lights, tile, paths, &visibility, *scale, light, groups);
         light.iter_mut().for_each(|light| *light *= *scale);
         let mut counters = ShadeCounters { shadow_rays, ..ShadeCounters::default() };
         if let Some(indirect) = indirect {
+            let light = parts.map_or(light, |parts| &mut parts.indirect);
             add_indirect(*accel, *indirect, paths, light, &mut counters);
         }
         counters

@@ -9,6 +9,7 @@ use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::indirect::{IndirectMesh, IndirectView};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
+use crate::render::layers::LightParts;
 use crate::render::meshes::MeshInterpolation;
 use crate::render::need::needed_points;
 use crate::render::paths::TilePaths;
@@ -30,27 +31,29 @@ pub struct LightMeshIntegrator<'a, A> {
 }
 
 /// Shading of a tile, as work for the best instruction set.
-struct Shade<'a, A> {
+struct Shade<'a, 'p, A> {
     integrator: &'a LightMeshIntegrator<'a, A>,
     tile: &'a Tile,
     paths: &'a TilePaths,
     light: &'a mut [Vec3],
+    parts: Option<&'a mut LightParts<'p>>,
 }
 
-impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
+impl<A: Accel> NullaryFnOnce for Shade<'_, '_, A> {
     type Output = ShadeCounters;
 
     #[inline(always)]
     fn call(self) -> ShadeCounters {
-        let Self { integrator, tile, paths, light } = self;
+        let Self { integrator, tile, paths, light, mut parts } = self;
         let vertices = &paths.vertices;
         let LightMeshIntegrator { world, direct, indirect, interpolation } = integrator;
         let accel = world.accel;
         let direct = direct.view(world.lights, &interpolation.direct);
         let mut counters = ShadeCounters::default();
         let mut scratch = LookupScratch::for_tile();
+        let mut groups = parts.as_mut().and_then(|parts| parts.groups.as_mut());
         if interpolation.hybrid {
-            counters = shade_hybrid(accel, direct, interpolation, tile, paths, &mut scratch, light);
+            counters = shade_hybrid(accel, direct, interpolation, tile, paths, &mut scratch, light, groups);
         } else {
             let mut before = Vec3::NAN;
             for (number, (vertex, light)) in vertices.iter().zip(&mut *light).enumerate() {
@@ -63,13 +66,24 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, A> {
                     direct.illumination(accel, surface, &mut scratch)
                 };
                 before = normal;
+                if let Some(groups) = &mut groups {
+                    let (groups, sums) = groups.of_vertex(number);
+                    direct.add_by_group(accel, surface, &mut scratch, groups, sums);
+                }
             }
         }
         counters.shadow_rays += scratch.rays;
         counters.direct_fallbacks = scratch.fallbacks;
 
         light.iter_mut().for_each(|light| *light *= interpolation.direct_scale);
+        if let Some(parts) = &mut parts {
+            parts.count_points(vertices, |vertex, found| {
+                let points = &direct.lookup.store.points;
+                interpolation.direct.neighbourhoods.find(points, &vertex.surface, found);
+            });
+        }
         if let (Some(indirect), Some(view)) = (indirect, &interpolation.indirect) {
+            let light = parts.map_or(light, |parts| &mut parts.indirect);
             add_indirect(accel, indirect.view(view), paths, light, &mut counters);
         }
         counters
@@ -106,7 +120,13 @@ impl<A: Accel> BlockIntegrator for LightMeshIntegrator<'_, A> {
         stats.seconds.mesh = seconds;
     }
 
-    fn shade(&self, tile: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
-        vectorize(Shade { integrator: self, tile, paths, light })
+    fn shade(
+        &self,
+        tile: &Tile,
+        paths: &TilePaths,
+        light: &mut [Vec3],
+        parts: Option<&mut LightParts>,
+    ) -> ShadeCounters {
+        vectorize(Shade { integrator: self, tile, paths, light, parts })
     }
 }

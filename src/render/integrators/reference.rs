@@ -8,7 +8,9 @@ use crate::light_mesh::direct::{Basis, DirectField, FieldEstimator};
 use crate::light_mesh::leaks::{LeakGuard, PROBES, is_inside};
 use crate::light_mesh::lookup::Differ;
 use crate::light_mesh::points::{AutoSpacing, Kernel, MeshError, Neighbourhoods, Neighbours, PointSet};
+use crate::lights::PackedGroups;
 use crate::render::frame::BlockIntegrator;
+use crate::render::layers::LightParts;
 use crate::render::paths::TilePaths;
 use crate::render::stats::{RenderStats, ShadeCounters};
 use crate::render::tiles::Tile;
@@ -124,6 +126,7 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
         surface: &SurfacePoint,
         samples: &mut Samples,
         counters: &mut ShadeCounters,
+        groups: Option<(&PackedGroups, &mut [Vec3])>,
     ) -> Vec3 {
         let World { accel, scene, lights, .. } = self.world;
         counters.direct_fallbacks += u64::from(self.place(surface, samples));
@@ -149,6 +152,9 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
         );
         counters.shadow_rays += leaked.rays;
         counters.direct_fallbacks += u64::from(leaked.all_dropped);
+        if let Some((groups, sums)) = groups {
+            estimator.add_by_group(surface, points, groups, sums);
+        }
         estimator.estimate(surface, points)
     }
 }
@@ -156,15 +162,23 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
 impl<A: Accel> BlockIntegrator for ReferenceIntegrator<'_, A> {
     fn evaluate(&mut self, _: &[TilePaths], _: &mut RenderStats) {}
 
-    fn shade(&self, _: &Tile, paths: &TilePaths, light: &mut [Vec3]) -> ShadeCounters {
+    fn shade(
+        &self,
+        _: &Tile,
+        paths: &TilePaths,
+        light: &mut [Vec3],
+        parts: Option<&mut LightParts>,
+    ) -> ShadeCounters {
         let scale = self.shading.direct_scale();
         let mut counters = ShadeCounters::default();
         let mut samples = Samples::default();
         if self.world.lights.is_empty() {
             return counters;
         }
-        for (vertex, light) in paths.vertices.iter().zip(light) {
-            *light = self.illumination(&vertex.surface, &mut samples, &mut counters) * scale;
+        let mut groups = parts.and_then(|parts| parts.groups.as_mut());
+        for (number, (vertex, light)) in paths.vertices.iter().zip(light).enumerate() {
+            let groups = groups.as_mut().map(|groups| groups.of_vertex(number));
+            *light = self.illumination(&vertex.surface, &mut samples, &mut counters, groups) * scale;
         }
         counters
     }

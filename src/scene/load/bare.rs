@@ -7,7 +7,6 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{LoadError, LoadedScene, Model, ModelFormat, load_model, load_scene_file};
-use crate::Bounds;
 use crate::scene::animation::{Animation, FRAMES_PER_SECOND};
 use crate::scene::{Falloff, Scene};
 use crate::settings::{IndirectSettings, Radius, Resolve, Settings};
@@ -46,7 +45,7 @@ impl OpenedScene {
             lights,
             falloff: Falloff::InverseSquare,
             background: Vec3::ZERO,
-            extent: Bounds::EMPTY,
+            ..Scene::default()
         };
         let mut settings = Settings::default();
         settings.shading.lambertian = true;

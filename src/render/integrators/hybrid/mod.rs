@@ -16,6 +16,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
+use crate::render::layers::GroupLight;
 use crate::render::meshes::MeshInterpolation;
 use crate::render::paths::TilePaths;
 use crate::render::shadow_edges::smooth_shadow_edges;
@@ -26,7 +27,8 @@ use patch::Patch;
 use prior::Prior;
 use trace::LightTracer;
 
-/// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light.
+/// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light, and `groups` with its parts.
+#[allow(clippy::too_many_arguments)]
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
@@ -36,6 +38,7 @@ pub(super) fn shade_hybrid<A: Accel>(
     paths: &TilePaths,
     scratch: &mut LookupScratch,
     light: &mut [Vec3],
+    mut groups: Option<&mut GroupLight>,
 ) -> ShadeCounters {
     let lights = mesh.estimator.lights;
     let vertices = &paths.vertices;
@@ -47,9 +50,9 @@ pub(super) fn shade_hybrid<A: Accel>(
     for patch in &mut patches {
         prior.add(patch, vertices, scratch);
     }
-    // What single lights come to matters for edges within pixels alone.
-    let has_edges = !paths.origins.is_empty();
-    let mut visibility = has_edges.then(|| prior.visibility(&patches, vertices.len()));
+    // What single lights come to matters for edges within pixels, and for groups of lights.
+    let is_asked = !paths.origins.is_empty() || groups.is_some();
+    let mut visibility = is_asked.then(|| prior.visibility(&patches, vertices.len()));
     let tracer = LightTracer::new(accel, lights, tile, &mut patches, &prior, visibility.as_mut());
     let mut counters = tracer.trace(vertices);
     for patch in &patches {
@@ -60,8 +63,12 @@ pub(super) fn shade_hybrid<A: Accel>(
         }
     }
     if let Some(visibility) = &visibility {
+        if let Some(groups) = &mut groups {
+            visibility.add_by_group(lights, vertices, groups);
+        }
         let scale = interpolation.direct_scale;
-        counters.shadow_rays += smooth_shadow_edges(accel, lights, tile, paths, visibility, scale, light);
+        counters.shadow_rays +=
+            smooth_shadow_edges(accel, lights, tile, paths, visibility, scale, light, groups);
     }
     counters
 }

@@ -28,6 +28,7 @@ pub struct LightTable {
     up: Option<Direction>,
     visible: Option<bool>,
     intensity: Color,
+    group: Option<String>,
 }
 
 /// `[[light_box]]`
@@ -44,6 +45,7 @@ pub struct LightBoxTable {
     color_variation: Option<Fraction>,
     radius: Option<Positive>,
     visible: Option<bool>,
+    group: Option<String>,
 }
 
 /// `[[light_grid]]`
@@ -57,6 +59,7 @@ pub struct LightGridTable {
     total_intensity: Option<Color>,
     radius: Option<Positive>,
     visible: Option<bool>,
+    group: Option<String>,
 }
 
 named_enum! {
@@ -100,7 +103,8 @@ impl LightTable {
         scene: &mut Scene,
     ) -> Result<(), LoadError> {
         let error = |problem: &str| places.error(&table.span(), &format!("light[{index}]"), problem);
-        let Self { position, direction, cone, radius, size, up, visible, intensity } = table.get_ref();
+        let Self { position, direction, cone, radius, size, up, visible, intensity, group } = table.get_ref();
+        let first = scene.lights.len();
         let is_placed = position.is_some() && direction.is_some();
         let problem = if cone.is_some() && !is_placed {
             Some("cone needs position and direction")
@@ -119,6 +123,8 @@ impl LightTable {
             Some("up belongs to a size")
         } else if visible.is_some() && direction.is_some() {
             Some("visible belongs to balls, which have no direction")
+        } else if group.is_some() && direction.is_some() && (radius.is_some() || size.is_some()) {
+            Some("group: discs and rectangles are emissive surfaces, whose light has no group")
         } else {
             None
         };
@@ -151,8 +157,23 @@ impl LightTable {
                 _ => scene.lights.push(Light::spot(position, direction, [inner, outer], intensity)),
             },
         }
-        Ok(())
+        assign(group.as_deref(), first, scene, error)
     }
+}
+
+/// Puts the lights of a table, from the given one on, into its group.
+fn assign(
+    group: Option<&str>,
+    first: usize,
+    scene: &mut Scene,
+    error: impl Fn(&str) -> LoadError,
+) -> Result<(), LoadError> {
+    let Some(group) = group else { return Ok(()) };
+    let lights = first..scene.lights.len();
+    scene
+        .light_groups
+        .assign(lights, group)
+        .map_err(|problem| error(&format!("group = \"{group}\": {problem}")))
 }
 
 /// Unit vectors along width and height of a rectangle that shines along `direction`, of unit length; its height is as much along `up` as can
@@ -248,13 +269,14 @@ impl LightBoxTable {
         let mut random = SplitMix64::new(u64::from(table.seed));
         let brightest = each * (1.0 + variation.unwrap_or(0.0));
         let lamp = PointOrBall::new(table.radius.as_ref(), table.visible, brightest, error)?;
+        let first = scene.lights.len();
         for _ in 0..table.count.0 {
             let position = random.in_box(min, max);
             let tint =
                 variation.map_or(Vec3::ONE, |v| random.in_box(Vec3::splat(1.0 - v), Vec3::splat(1.0 + v)));
             lamp.add(scene, position, each * tint);
         }
-        Ok(())
+        assign(table.group.as_deref(), first, scene, error)
     }
 }
 
@@ -278,11 +300,12 @@ impl LightGridTable {
         let each = each(table.intensity, table.total_intensity, count, error)?;
         let cells = Vec3::new(nx as f32, ny as f32, nz as f32);
         let lamp = PointOrBall::new(table.radius.as_ref(), table.visible, each, error)?;
+        let first = scene.lights.len();
         for i in 0..count {
             let cell = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / nx / ny) as f32);
             let position = min + (max - min) * ((cell + 0.5) / cells);
             lamp.add(scene, position, each);
         }
-        Ok(())
+        assign(table.group.as_deref(), first, scene, error)
     }
 }
