@@ -192,7 +192,7 @@ impl Job<'_> {
         let options = ImageOptions {
             sample_type,
             exposure: settings.output.exposure,
-            metadata: metadata(backend, settings, &stats),
+            metadata: metadata(backend, settings, number.is_none().then_some(&stats)),
         };
         for target in &targets {
             target.write(&image, &options)?;
@@ -234,15 +234,16 @@ impl Job<'_> {
     }
 }
 
-/// What is stored in the image: nothing that differs from run to run.
-fn metadata(backend: &Backend, settings: &Settings, stats: &RenderStats) -> Vec<(String, String)> {
+/// What is stored in the image: nothing that differs from run to run. How many rays a frame took follows from the frames before it.
+fn metadata(backend: &Backend, settings: &Settings, still: Option<&RenderStats>) -> Vec<(String, String)> {
     let entry = |key: &str, value: String| (key.to_owned(), value);
-    vec![
+    let mut entries = vec![
         entry("Software", format!("lightmesh {}", env!("CARGO_PKG_VERSION"))),
         entry("lightmesh:backend", backend.to_string()),
         entry("lightmesh:settings", format!("{settings:?}")),
-        entry("lightmesh:shadow_rays", stats.rays.shadow.to_string()),
-    ]
+    ];
+    entries.extend(still.map(|stats| entry("lightmesh:shadow_rays", stats.rays.shadow.to_string())));
+    entries
 }
 
 /// One line on what was done.
