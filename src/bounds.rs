@@ -1,9 +1,10 @@
 //! Axis-aligned boxes.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Axis-aligned box; empty when any `min` exceeds `max`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Lower corner.
     pub min: Vec3,

@@ -9,8 +9,10 @@ use crate::accel::{BackendError, MemoryLimitError};
 use crate::bench::BenchError;
 use crate::crosscheck::RayTextError;
 use crate::image::ImageError;
+use crate::image::exr::MergeError;
 use crate::image::metrics::MetricsError;
-use crate::render::{RenderError, SessionError};
+use crate::light_mesh::file::MeshFileError;
+use crate::render::{RenderError, SessionError, WriteMeshesError};
 use crate::scene::generate::GenerateError;
 use crate::scene::load::LoadError;
 
@@ -84,6 +86,52 @@ pub enum CommandError {
         /// Those that exist.
         names: String,
     },
+    /// A signal ended the work; `kept` says what is not lost.
+    #[error("interrupted: {kept}")]
+    Interrupted {
+        /// The exit code that belongs to the signal.
+        exit_code: u8,
+        /// What was kept, and how to go on.
+        kept: String,
+    },
+    /// Signals can't be caught.
+    #[error("cannot catch signals")]
+    Signals(#[source] io::Error),
+    /// A part of an image that there is not.
+    #[error("the image has {width}×{height} pixels: {problem}")]
+    Region {
+        /// Its columns.
+        width: u32,
+        /// Its rows.
+        height: u32,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Parts of an image don't make it.
+    #[error("{}", file.display())]
+    Merge {
+        /// The part that doesn't belong to it, or the image.
+        file: PathBuf,
+        /// Why.
+        source: MergeError,
+    },
+    /// Triangles or lights move, so that frames have no light mesh in common.
+    #[error("{}: more than cameras moves in these frames, which then have no light mesh in common: `render --frames` keeps what it can", scene.display())]
+    MovingBake {
+        /// The scene file.
+        scene: PathBuf,
+    },
+    /// A light mesh can't be used.
+    #[error("{}", file.display())]
+    LightMesh {
+        /// Its file.
+        file: PathBuf,
+        /// Why.
+        source: MeshFileError,
+    },
+    /// A light mesh can't be written.
+    #[error(transparent)]
+    WriteLightMesh(#[from] WriteMeshesError),
     /// Several frames would be written to one file.
     #[error("{}: several frames need a place for their number in its name, such as frame.####.exr", .0.display())]
     FrameName(PathBuf),
@@ -180,6 +228,19 @@ pub enum CommandError {
     /// The result can't be printed.
     #[error("cannot print the result")]
     Print(#[from] io::Error),
+}
+
+impl CommandError {
+    /// The exit code of the program: that of the signal that ended it, or 3 if a light mesh belongs to another scene or other settings, which a script may answer by baking it again.
+    pub(super) fn exit_code(&self) -> ExitCode {
+        let mismatch = match self {
+            Self::Interrupted { exit_code, .. } => return ExitCode::from(*exit_code),
+            Self::LightMesh { source, .. } => source.is_mismatch(),
+            Self::WriteLightMesh(WriteMeshesError::File { source, .. }) => source.is_mismatch(),
+            _ => false,
+        };
+        ExitCode::from(if mismatch { 3 } else { 1 })
+    }
 }
 
 /// An error and its causes in one line: `a: b: c`.

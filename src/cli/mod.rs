@@ -1,5 +1,6 @@
 //! The program's command line: one file per subcommand.
 
+mod bake;
 mod bench;
 mod choice;
 pub mod compare;
@@ -10,13 +11,22 @@ pub mod gallery;
 mod generate;
 mod info;
 mod init;
+mod interrupt;
+mod job;
+mod light_mesh;
+mod merge;
 mod overrides;
 mod parse;
 mod partial;
 mod progress;
+mod ready;
+mod region;
 mod render;
+mod resume;
 mod shared;
+mod sinks;
 mod stats_file;
+mod written;
 
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
@@ -38,6 +48,10 @@ struct Cli {
 enum Command {
     /// Render a scene file to an image.
     Render(Box<render::RenderArgs>),
+    /// Evaluate a scene's light mesh and keep it in a file, for any number of renders.
+    Bake(Box<bake::BakeArgs>),
+    /// Put parts of an image together that `render --tile` or `--crop` wrote.
+    Merge(merge::MergeArgs),
     /// Report what a scene file or model holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
@@ -68,6 +82,8 @@ impl Command {
     fn run(&self, out: &mut dyn Write) -> Result<Outcome, CommandError> {
         match self {
             Self::Render(args) => render::run(args),
+            Self::Bake(args) => bake::run(args),
+            Self::Merge(args) => merge::run(args),
             Self::Info(args) => info::run(args, out),
             Self::Init(args) => init::run(args),
             Self::Generate(args) => generate::run(args),
@@ -84,7 +100,7 @@ const USAGE: u8 = 2;
 
 /// Runs the program: parses the command line, runs the subcommand, reports an error once.
 ///
-/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
+/// Exit codes: 0 for success, 1 for failure, 2 for wrong usage, 3 for a light mesh of another scene, 130 or 143 for Ctrl-C or SIGTERM.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse().and_then(Cli::checked) {
         Ok(cli) => cli,
@@ -103,7 +119,7 @@ pub fn main() -> ExitCode {
         Ok(outcome) => outcome.into(),
         Err(error) => {
             let _ = writeln!(io::stderr(), "lightmesh: {}", describe(&error));
-            ExitCode::FAILURE
+            error.exit_code()
         }
     }
 }

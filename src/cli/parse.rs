@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use glam::Vec3;
 
+use crate::Bounds;
 use crate::image::MAX_PIXELS;
 use crate::settings::{MAX_EXPOSURE, MAX_FILTER_WIDTH, Radius, Spacing};
 
@@ -63,6 +64,19 @@ pub fn point(text: &str) -> Result<Vec3, String> {
     match numbers.as_deref() {
         Ok(&[x, y, z]) => Ok(Vec3::new(x, y, z)),
         _ => Err("three numbers, such as 0,1.5,-2".to_owned()),
+    }
+}
+
+/// A box, by two of its corners.
+pub fn bounds(text: &str) -> Result<Bounds, String> {
+    let numbers: Result<Vec<f32>, _> =
+        text.split(',').map(|text| number(text, "a number", |_| true)).collect();
+    match numbers.as_deref() {
+        Ok(&[x0, y0, z0, x1, y1, z1]) => {
+            let (a, b) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
+            Ok(Bounds { min: a.min(b), max: a.max(b) })
+        }
+        _ => Err("two corners, such as 0,0,0,4,2.5,6".to_owned()),
     }
 }
 

@@ -2,15 +2,17 @@
 
 use std::sync::Mutex;
 
-use super::progress::Bar;
-use crate::image::{Image, ImageError, ImageOptions, OutputTarget, exr::SampleType, tone::auto_exposure};
+use crate::image::{
+    Image, ImageError, ImageOptions, OutputTarget, Window, exr::SampleType, tone::auto_exposure,
+};
 use crate::render::{Tile, TileSink};
 
-/// Passes tiles on to the bar, and writes the pictures that are finished before the last one.
+/// Writes the pictures that are finished before the last one.
 pub struct PartialPictures<'a> {
-    bar: &'a Bar,
     targets: &'a [OutputTarget],
     sample_type: SampleType,
+    /// The part that is written.
+    window: Option<Window>,
     /// `None` for one that suits the picture.
     exposure: Option<f32>,
     /// The first file that couldn't be written.
@@ -18,14 +20,14 @@ pub struct PartialPictures<'a> {
 }
 
 impl<'a> PartialPictures<'a> {
-    /// Moves `bar` on, and writes pictures to `targets`, with an exposure that suits them if none is given.
+    /// Writes pictures to `targets`, with an exposure that suits them if none is given.
     pub fn new(
-        bar: &'a Bar,
         targets: &'a [OutputTarget],
         sample_type: SampleType,
+        window: Option<Window>,
         exposure: Option<f32>,
     ) -> Self {
-        Self { bar, targets, sample_type, exposure, failed: Mutex::new(None) }
+        Self { targets, sample_type, window, exposure, failed: Mutex::new(None) }
     }
 
     /// # Errors
@@ -36,13 +38,16 @@ impl<'a> PartialPictures<'a> {
 }
 
 impl TileSink for PartialPictures<'_> {
-    fn tile(&self, tile: &Tile, pixels: &[[f32; 3]]) {
-        self.bar.tile(tile, pixels);
-    }
+    fn tile(&self, _: &Tile, _: &[[f32; 3]]) {}
 
     fn picture(&self, image: &Image) {
         let exposure = self.exposure.unwrap_or_else(|| auto_exposure(image.pixels()));
-        let options = ImageOptions { sample_type: self.sample_type, exposure, metadata: Vec::new() };
+        let options = ImageOptions {
+            sample_type: self.sample_type,
+            exposure,
+            window: self.window,
+            metadata: Vec::new(),
+        };
         let written = self.targets.iter().try_for_each(|target| target.write(image, &options));
         if let (Err(error), Ok(mut failed)) = (written, self.failed.lock()) {
             failed.get_or_insert(error);

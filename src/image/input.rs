@@ -29,3 +29,15 @@ pub fn decode(bytes: &[u8]) -> Result<Image, DecodeError> {
         Err(DecodeError::UnknownFormat)
     }
 }
+
+/// Names and values that are stored in an EXR or PNG file, of EXR the first part's. Nothing if the file can't be read or is none of these.
+pub fn metadata(path: &Path) -> Vec<(String, String)> {
+    let Ok(bytes) = std::fs::read(path) else { return Vec::new() };
+    if bytes.starts_with(&exr::SIGNATURE) {
+        exr::metadata(&bytes)
+    } else if bytes.starts_with(&png::SIGNATURE) {
+        png::metadata(&bytes)
+    } else {
+        Vec::new()
+    }
+}

@@ -9,10 +9,12 @@ pub mod metrics;
 pub mod output;
 pub mod png;
 pub mod tone;
+mod window;
 
 pub use error::{DecodeError, ImageError};
 pub use image::{Image, MAX_PIXELS};
-pub use input::{decode, read};
+pub use input::{decode, metadata, read};
 pub use output::{ImageFormat, ImageOptions, OutputFile, OutputTarget};
+pub use window::Window;
 
 pub(crate) use image::is_finite;

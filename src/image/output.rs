@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use super::exr::SampleType;
-use super::{Image, ImageError, exr, png};
+use super::{Image, ImageError, Window, exr, png};
 
 /// A file that can be written, as far as a check beforehand shows.
 #[derive(Clone, Debug)]
@@ -70,9 +70,25 @@ impl OutputFile {
     ///
     /// If that fails; then the file is as it was before, and no temporary file is left.
     pub fn write(&self, bytes: &[u8]) -> Result<(), ImageError> {
+        self.replace(bytes, false)
+    }
+
+    /// The same, and waits until the bytes are on the disk, so that not even a loss of power loses both what was there and what was written.
+    ///
+    /// # Errors
+    ///
+    /// As for [`OutputFile::write`].
+    pub fn write_durably(&self, bytes: &[u8]) -> Result<(), ImageError> {
+        self.replace(bytes, true)
+    }
+
+    fn replace(&self, bytes: &[u8], durably: bool) -> Result<(), ImageError> {
         let write = || {
             let mut temporary = self.create_temporary()?;
             temporary.write_all(bytes)?;
+            if durably {
+                temporary.as_file().sync_all()?;
+            }
             temporary.persist(&self.resolved)?;
             Ok(())
         };
@@ -118,6 +134,8 @@ pub struct ImageOptions {
     pub sample_type: SampleType,
     /// Exposure of PNG files in stops.
     pub exposure: f32,
+    /// The part of the image that is written; EXR files say where in the image it lies. `None` for all.
+    pub window: Option<Window>,
     /// Names and values stored in the file: version, backend, settings.
     pub metadata: Vec<(String, String)>,
 }
@@ -172,10 +190,20 @@ impl OutputTarget {
     /// If that fails; then the file is as it was before.
     pub fn write(&self, image: &Image, options: &ImageOptions) -> Result<(), ImageError> {
         let refuse = |cause: String| ImageError::Encode { path: self.path().to_path_buf(), cause };
+        let crop = match options.window.map(|window| (window, image.crop(window))) {
+            None => None,
+            Some((window, Some(crop))) => Some((window, crop)),
+            Some((_, None)) => return Err(refuse("the part lies beyond the image".to_owned())),
+        };
+        let shown = crop.as_ref().map_or(image, |(_, crop)| crop);
         let bytes = match self.format {
-            ImageFormat::Exr => exr::encode(image, options.sample_type, &options.metadata)
-                .map_err(|error| refuse(error.to_string()))?,
-            ImageFormat::Png => png::encode(image, options.exposure, &options.metadata)
+            ImageFormat::Exr => {
+                let display = (image.width(), image.height());
+                let window = options.window.unwrap_or(Window::whole(display));
+                exr::encode_part(shown, display, window, options.sample_type, &options.metadata)
+                    .map_err(|error| refuse(error.to_string()))?
+            }
+            ImageFormat::Png => png::encode(shown, options.exposure, &options.metadata)
                 .map_err(|error| refuse(error.to_string()))?,
         };
         self.file.write(&bytes)

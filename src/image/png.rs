@@ -63,6 +63,16 @@ pub fn encode_rgb8(
     Ok(bytes)
 }
 
+/// Texts that the file's chunks before its pixels hold; none if it is damaged there.
+pub fn metadata(bytes: &[u8]) -> Vec<(String, String)> {
+    let Ok(reader) = Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return Vec::new() };
+    let info = reader.info();
+    let latin = info.uncompressed_latin1_text.iter().map(|chunk| (chunk.keyword.clone(), chunk.text.clone()));
+    let other =
+        info.utf8_text.iter().filter_map(|chunk| Some((chunk.keyword.clone(), chunk.get_text().ok()?)));
+    latin.chain(other).collect()
+}
+
 /// Decodes a PNG of any colour type and depth to linear RGB.
 ///
 /// The transfer function is sRGB, unless the file has a gAMA chunk with another exponent and no sRGB chunk.

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::lights::{IncidentLights, PackedLights};
@@ -11,7 +12,7 @@ use crate::scene::{Falloff, Ray, SurfacePoint};
 use crate::simd::{LANES, Lanes};
 
 /// A light that may be asked about.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Candidate {
     /// Its index in the packed lights.
     pub light: u32,

@@ -15,6 +15,7 @@
 //!
 //! | room | what |
 //! |---|---|
+//! | [`file`] | files of sections that are mapped |
 //! | `points` | positions and ids, kernels, finding the points of D_y |
 //! | `leaks` | which points of D_y count for a surface point |
 //! | `store` | which points are known, and in which slot |
@@ -27,6 +28,7 @@
 
 pub mod direct;
 mod direct_light;
+pub mod file;
 pub mod indirect;
 pub(crate) mod leaks;
 pub mod lookup;

@@ -1,6 +1,7 @@
 //! Sixteen lights, and what they are made of.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::emitters::Emitter;
 use super::kinds::KindLanes;
@@ -11,7 +12,7 @@ use crate::scene::{Light, LightKind};
 use crate::simd::{LANES, Lanes};
 
 /// Sixteen lights.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LightChunk {
     /// lp, by axis; of directional lights, the way to walk from anywhere to be beyond the scene.
     pub position: [Lanes; 3],

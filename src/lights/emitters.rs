@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::Bounds;
 use crate::scene::{Hit, Scene};
@@ -20,7 +21,7 @@ const MOST_CUTS: usize = 4096;
 const FINE: f32 = 1.0 / 512.0;
 
 /// A part of an emissive triangle.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Piece {
     /// A corner, and the ways from it to the other two.
     corner: Vec3,

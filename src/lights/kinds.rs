@@ -1,12 +1,14 @@
 //! What spot and directional lights differ in from point lights, sixteen at a time.
 
+use serde::{Deserialize, Serialize};
+
 use super::emitters::Emitter;
 use super::falloff::{FalloffLaw, InverseSquareFalloff};
 use crate::scene::LightKind;
 use crate::simd::{LANES, Lanes};
 
 /// Spot and directional lights of a chunk; lanes with point lights hold what changes nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct KindLanes {
     /// 0 for directional lights, 1 for the others: what the lit point is multiplied by before the way to the light
     /// is taken.

@@ -1,6 +1,7 @@
 //! The lights as structures of arrays, and the one loop that sums their contributions.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::chunk::{LightChunk, Loose};
 use super::emitters::Emitter;
@@ -13,7 +14,7 @@ use crate::simd::{LANES, Lanes, horizontal_sums};
 ///
 /// The order is that of the scene, except that point lights come first, and lights are sorted along a Morton curve:
 /// lights in one chunk are neighbours, so that they are mostly seen together or hidden together.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PackedLights {
     chunks: Vec<LightChunk>,
     falloff: Falloff,

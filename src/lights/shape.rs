@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::emitters::Piece;
 use crate::sampling::hash_to_unit_cube;
@@ -21,7 +22,7 @@ const BEYOND_FACETS: f32 = 1.01;
 const SHORTER: f32 = 1.0 - 1e-4;
 
 /// The part of a lamp that a light stands for.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LampShape {
     /// No size: rays end at the light's position.
     #[default]

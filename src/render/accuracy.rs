@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How differences of pixels make an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
     /// Root of the mean squared difference, over the mean of the picture: averaged shadows are wrong a little everywhere.
@@ -16,7 +16,7 @@ pub enum Measure {
 }
 
 /// An estimate of the error of a picture's direct light.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEstimate {
     /// What it is an error of.
     pub measure: Measure,
@@ -35,7 +35,7 @@ pub struct ErrorEstimate {
 }
 
 /// What ended a render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
     /// The error is within the limit: pixels or blocks all over the picture say so with 95 % confidence, and the brightest pixels don't contradict.
@@ -51,7 +51,7 @@ pub enum Ending {
 }
 
 /// How wrong a picture is, and why it was left at that.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Accuracy {
     /// The error that was asked for.
     pub asked: f32,

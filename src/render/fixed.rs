@@ -3,10 +3,12 @@
 use super::choice::choose;
 use super::error::RenderError;
 use super::film::TileSink;
-use super::frame::{Frame, StopToken};
+use super::frame::{Frame, Purpose, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
+use super::known_view::KnownView;
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
+use super::settled::Settled;
 use super::stats::{RenderStats, timed};
 use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
 use crate::accel::Accel;
@@ -22,12 +24,16 @@ pub(super) struct View<'a, A> {
     pub camera: &'a Camera,
     pub sink: &'a dyn TileSink,
     pub stop: &'a StopToken,
+    /// What a file knows of it.
+    pub known: Option<&'a KnownView>,
+    /// What is made of it.
+    pub purpose: Purpose,
 }
 
 impl<A: Accel> View<'_, A> {
     /// The view, cut up.
     pub(super) fn frame<'a>(&'a self, settings: &'a Settings) -> Frame<'a, A> {
-        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop)
+        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop, self.purpose)
     }
 
     pub(super) fn render_fixed(
@@ -35,17 +41,18 @@ impl<A: Accel> View<'_, A> {
         settings: &Settings,
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
-        render_frame(self.frame(settings), self.camera, settings, meshes)
+        render_frame(self.frame(settings), self, settings, meshes)
     }
 }
 
 /// Renders with the integrator that the settings name.
 fn render_frame<A: Accel>(
     mut frame: Frame<A>,
-    camera: &Camera,
+    view: &View<A>,
     settings: &Settings,
     meshes: &mut LightMeshes,
 ) -> Result<(Image, RenderStats), RenderError> {
+    let camera = view.camera;
     let mut stats = RenderStats::default();
     let world = frame.world;
     let integrator = match settings.shading.integrator {
@@ -57,6 +64,9 @@ fn render_frame<A: Accel>(
         named => named,
     };
     stats.integrator = Some(integrator);
+    let settled = Settled::of(integrator, settings);
+    stats.settled = Some(settled);
+    frame.begin(&settled.settings(settings));
     let by_light_mesh = matches!(integrator, Integrator::LightMesh | Integrator::Auto);
     let interpolation = if by_light_mesh {
         let interpolation = meshes.interpolation(world.scene, camera, settings)?;
@@ -67,7 +77,8 @@ fn render_frame<A: Accel>(
         None
     };
     if let Some(mesh) = &mut meshes.surface {
-        evaluate_surface_light(&mut frame, mesh, camera, settings, &mut stats)?;
+        let known = view.known.map(|known| &known.records[..]).filter(|known| !known.is_empty());
+        evaluate_surface_light(&mut frame, mesh, camera, known, &mut stats)?;
     }
     let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
     let image = match (integrator, interpolation) {

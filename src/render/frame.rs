@@ -1,5 +1,6 @@
 //! The stages of a frame, one after the other for each block of tiles: trace → need → evaluate → shade → film (method §9).
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -7,7 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::error::RenderError;
-use super::film::{TileSink, resolve, resolve_block};
+use super::film::{TileSink, put_tile, resolve, resolve_block};
 use super::paths::TilePaths;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};
@@ -15,7 +16,7 @@ use super::trace::trace_paths;
 use crate::accel::Accel;
 use crate::image::Image;
 use crate::scene::{Camera, CameraRays};
-use crate::settings::ViewSettings;
+use crate::settings::{Settings, ViewSettings};
 use crate::world::World;
 
 /// What differs between the integrators.
@@ -30,7 +31,7 @@ pub trait BlockIntegrator: Sync {
 /// Stops a render between two tiles. Clones stop the same renders.
 #[derive(Clone, Debug, Default)]
 pub struct StopToken {
-    stopped: std::sync::Arc<AtomicBool>,
+    stopped: Arc<AtomicBool>,
     /// When a render stops by itself.
     deadline: Option<Instant>,
 }
@@ -39,6 +40,11 @@ impl StopToken {
     /// Stops the renders that were given this token or a clone of it.
     pub fn stop(&self) {
         self.stopped.store(true, Ordering::Relaxed);
+    }
+
+    /// What stops the renders when it is set, for signal handlers.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        self.stopped.clone()
     }
 
     /// Whether [`StopToken::stop`] was called, or a deadline has passed.
@@ -72,6 +78,15 @@ const BLOCK_MERGED_SAMPLES: u64 = 1 << 20;
 /// they have one; beyond, they are traced a second time, and counted twice.
 const KEPT_SAMPLES: u64 = 1 << 25;
 
+/// What a view is rendered for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Its image.
+    Image,
+    /// The light meshes that its image needs: where no image has to be judged, none is made.
+    Meshes,
+}
+
 /// What is rendered: a view of a world, and who receives it.
 pub struct Frame<'a, A> {
     /// The world.
@@ -82,6 +97,7 @@ pub struct Frame<'a, A> {
     blocks: Vec<Vec<Tile>>,
     sink: &'a dyn TileSink,
     stop: &'a StopToken,
+    purpose: Purpose,
     /// Camera paths that were traced already, by block.
     kept: Vec<Vec<TilePaths>>,
 }
@@ -94,13 +110,19 @@ impl<'a, A: Accel> Frame<'a, A> {
         view: &'a ViewSettings,
         sink: &'a dyn TileSink,
         stop: &'a StopToken,
+        purpose: Purpose,
     ) -> Self {
         let camera = CameraRays::new(camera, view.resolution, 1).with_samples(view.samples());
         let samples = u64::from(view.samples_per_pixel);
         let most = if samples == 1 { BLOCK_SAMPLES } else { BLOCK_MERGED_SAMPLES };
         let block_pixels = view.block_samples.unwrap_or(most) / samples;
         let blocks = blocks(view.resolution, block_pixels);
-        Self { world, view, camera, blocks, sink, stop, kept: Vec::new() }
+        Self { world, view, camera, blocks, sink, stop, purpose, kept: Vec::new() }
+    }
+
+    /// Tells the sink that a picture begins, by settings that leave nothing open.
+    pub(super) fn begin(&self, settings: &Settings) {
+        self.sink.begin(settings);
     }
 
     /// Traces the camera paths of a block; what `paths` held before is gone, but its memory is used again.
@@ -158,6 +180,7 @@ impl<'a, A: Accel> Frame<'a, A> {
     ) -> Result<Image, RenderError> {
         let (width, height) = self.view.resolution;
         let mut image = Image::new(width, height)?;
+        self.leave_out(&mut image);
         let mut kept = std::mem::take(&mut self.kept).into_iter();
         // Kept from block to block: the first use of memory costs a sixth of the camera paths.
         let mut paths: Vec<TilePaths> = Vec::new();
@@ -167,6 +190,10 @@ impl<'a, A: Accel> Frame<'a, A> {
                 None => self.trace(block, &mut paths, stats)?,
             }
             integrator.evaluate(&paths, stats);
+            if self.purpose == Purpose::Meshes {
+                self.stop.check()?;
+                continue;
+            }
             let mut shade = stats.seconds.shade;
             let counters = timed(&mut shade, || {
                 let counters = self.shade(integrator, block, &mut paths);
@@ -178,6 +205,33 @@ impl<'a, A: Accel> Frame<'a, A> {
             self.stop.check()?;
         }
         Ok(image)
+    }
+
+    /// Leaves out the tiles that nobody asked for, and those whose pixels are known, which are put into the image.
+    fn leave_out(&mut self, image: &mut Image) {
+        let Self { view, sink, .. } = *self;
+        let mut is_left = |tile: &Tile| {
+            if view.crop.is_some_and(|crop| !crop.meets(&tile.window())) {
+                return false;
+            }
+            let known = sink.known(tile).filter(|pixels| pixels.len() == tile.pixels());
+            known.iter().for_each(|pixels| {
+                put_tile(tile, pixels, image);
+                sink.tile(tile, pixels);
+            });
+            known.is_none()
+        };
+        let mut kept = std::mem::take(&mut self.kept).into_iter();
+        for block in std::mem::take(&mut self.blocks) {
+            let is_left: Vec<bool> = block.iter().map(&mut is_left).collect();
+            if let Some(mut paths) = kept.next() {
+                let mut stays = is_left.iter();
+                paths.retain(|_| stays.next() == Some(&true));
+                self.kept.push(paths);
+            }
+            let left = block.into_iter().zip(is_left).filter(|(_, is_left)| *is_left);
+            self.blocks.push(left.map(|(tile, _)| tile).collect());
+        }
     }
 
     /// Shades a block; tiles that are left when the render is stopped stay as they are.

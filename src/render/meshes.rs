@@ -2,14 +2,16 @@
 
 use glam::Vec3;
 
+use super::known_view::{KnownView, identity};
 use super::scene_lights::SceneLights;
+use super::stats::RenderStats;
 use crate::Bounds;
 use crate::light_mesh::direct::{DirectInterpolation, DirectMesh, KeptBits, Motion};
 use crate::light_mesh::indirect::{DirectTransport, IndirectInterpolation, IndirectMesh};
 use crate::light_mesh::points::{AutoSpacing, MeshError};
 use crate::light_mesh::surface::SurfaceMesh;
 use crate::lights::PackedLights;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Fingerprint, Scene};
 use crate::settings::{
     Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
     Settings, Spacing,
@@ -28,6 +30,10 @@ pub struct LightMeshes {
     pub(super) surface: Option<SurfaceMesh>,
     /// What the values of the indirect mesh follow from.
     indirect_identity: Option<IndirectIdentity>,
+    /// Views that were rendered, or that a file knows.
+    pub(super) views: Vec<KnownView>,
+    /// Those of a file, which are taken as they are.
+    pub(super) known_views: Vec<KnownView>,
 }
 
 /// The meshes of indirect light, while others are rendered.
@@ -91,7 +97,15 @@ impl LightMeshes {
     /// Meshes over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
         let direct = DirectMesh::new(bounds);
-        Self { direct, has_emitters: false, indirect: None, surface: None, indirect_identity: None }
+        Self {
+            direct,
+            has_emitters: false,
+            indirect: None,
+            surface: None,
+            indirect_identity: None,
+            views: Vec::new(),
+            known_views: Vec::new(),
+        }
     }
 
     /// Makes the direct mesh one of these lights: it starts anew where emissive triangles are among them all at once, or no longer.
@@ -183,6 +197,54 @@ impl LightMeshes {
     pub(super) fn forget_intensities(&mut self) {
         self.direct.forget_intensities();
         (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
+        (self.views, self.known_views) = (Vec::new(), Vec::new());
+    }
+
+    /// Fingerprint of what light from surfaces follows from, if there is any.
+    pub(super) fn indirect_fingerprint(&self) -> Option<Fingerprint> {
+        self.indirect_identity.as_ref().map(Fingerprint::of)
+    }
+
+    /// The same for settings.
+    pub(super) fn wanted_indirect(scene: &Scene, settings: &Settings) -> Option<Fingerprint> {
+        IndirectIdentity::of(settings, scene).as_ref().map(Fingerprint::of)
+    }
+
+    /// Takes the meshes of indirect light that were put in for those that the settings ask for.
+    pub(super) fn accept_indirect(&mut self, scene: &Scene, settings: &Settings) {
+        self.indirect_identity = IndirectIdentity::of(settings, scene);
+    }
+
+    /// Makes the meshes of indirect light ones like those of other meshes, with no point known.
+    pub(super) fn take_indirect_like(
+        &mut self,
+        other: &Self,
+        scene: &Scene,
+        settings: &Settings,
+    ) -> Result<(), MeshError> {
+        if other.indirect_identity.is_some() {
+            self.indirect_identity = None;
+            self.renew_indirect(scene, settings)?;
+        }
+        Ok(())
+    }
+
+    /// Remembers a view that was rendered.
+    pub(super) fn remember(&mut self, camera: &Camera, settings: &Settings, stats: &RenderStats) {
+        let records = self.surface.as_ref().map(SurfaceMesh::view_records).unwrap_or_default();
+        if let Some(view) = KnownView::of(camera, settings, stats, records) {
+            self.views.retain(|known| known.identity != view.identity);
+            self.views.push(view);
+        }
+    }
+
+    /// What a file knows of a view.
+    pub(super) fn known_view(&self, camera: &Camera, settings: &Settings) -> Option<&KnownView> {
+        if self.known_views.is_empty() {
+            return None;
+        }
+        let identity = identity(camera, settings);
+        self.known_views.iter().find(|view| view.identity == identity)
     }
 
     /// Forgets what may be otherwise after geometry in some boxes, where it was and where it is, has moved, or lights; `lights` are those before
@@ -194,6 +256,7 @@ impl LightMeshes {
         lights: [&SceneLights; 2],
     ) -> KeptBits {
         (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
+        (self.views, self.known_views) = (Vec::new(), Vec::new());
         let [before, after] = lights.map(|lights| {
             lights
                 .with_emitters

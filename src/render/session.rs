@@ -1,17 +1,22 @@
 //! A scene that is rendered more than once: everything that outlives a view.
 
+use std::path::Path;
+
 use glam::Vec3;
 
 use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::fixed::View;
-use super::frame::StopToken;
+use super::frame::{Purpose, StopToken};
+use super::mesh_file::{MeshScene, RestoredMeshes, WriteMeshesError};
 use super::meshes::LightMeshes;
 use super::scene_lights::SceneLights;
 use super::stats::RenderStats;
+use crate::Bounds;
 use crate::accel::{Accel, Backend, BackendChoice};
 use crate::image::Image;
-use crate::light_mesh::direct::{Basis, DirectField};
+use crate::light_mesh::direct::{Basis, DirectEvaluation, DirectField};
+use crate::light_mesh::file::{MeshFile, MeshFileError};
 use crate::lights::EmissiveTriangles;
 use crate::scene::{Camera, Scene, SceneError};
 use crate::settings::Settings;
@@ -110,7 +115,77 @@ impl Session {
         let Self { scene, backend, lights, emissive, meshes } = self;
         let lights = lights.of_settings(settings);
         let world = World { accel: &*backend, scene, lights, emissive };
-        render_world(world, camera, settings, meshes, sink, stop)
+        let shown = Shown { camera, sink, stop, purpose: Purpose::Image };
+        render_world(world, shown, settings, meshes)
+    }
+
+    /// Makes known what a view needs of the light meshes, and what its settings leave open. Where nothing has to be measured, that takes no image.
+    ///
+    /// # Errors
+    /// See [`RenderError`]. The values of mesh points that were evaluated before an error stay known.
+    pub fn prepare(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        sink: &dyn TileSink,
+        stop: &StopToken,
+    ) -> Result<RenderStats, RenderError> {
+        let Self { scene, backend, lights, emissive, meshes } = self;
+        let lights = lights.of_settings(settings);
+        let world = World { accel: &*backend, scene, lights, emissive };
+        let shown = Shown { camera, sink, stop, purpose: Purpose::Meshes };
+        Ok(render_world(world, shown, settings, meshes)?.1)
+    }
+
+    /// Makes all mesh points of direct light in a box known whose spacing these settings have there, for a camera where the spacing follows from
+    /// one. Returns how many were evaluated, and the rays that took.
+    ///
+    /// # Errors
+    /// See [`RenderError`]; [`RenderError::Stopped`] between two parts of the box.
+    pub fn prepare_box(
+        &mut self,
+        bounds: Bounds,
+        camera: &Camera,
+        settings: &Settings,
+        stop: &StopToken,
+    ) -> Result<DirectEvaluation, RenderError> {
+        settings.check()?;
+        let Self { scene, backend, lights, emissive, meshes } = self;
+        let lights = lights.of_settings(settings);
+        let world = World { accel: &*backend, scene, lights, emissive };
+        meshes.renew_lights(lights);
+        let interpolation = meshes.interpolation(scene, camera, settings)?.direct;
+        let mut evaluation = DirectEvaluation::default();
+        for part in interpolation.neighbourhoods.parts_of(bounds) {
+            stop.check()?;
+            let needed = meshes.direct.points_in(&interpolation, part);
+            evaluation.add(meshes.direct.evaluate(world, &interpolation, &needed));
+        }
+        Ok(evaluation)
+    }
+
+    /// Takes the light meshes of a file (docs/light-mesh-files.md), to be used with these settings, for its own.
+    ///
+    /// # Errors
+    /// See [`MeshFileError`]; then what was known stays.
+    pub fn read_light_meshes(
+        &mut self,
+        path: &Path,
+        settings: &Settings,
+    ) -> Result<RestoredMeshes, MeshFileError> {
+        let of = MeshScene { scene: &self.scene, lights: self.lights.of_settings(settings), settings };
+        let (meshes, restored) = LightMeshes::of_file(&MeshFile::open(path)?, of)?;
+        self.meshes = meshes;
+        Ok(restored)
+    }
+
+    /// Adds the light meshes to a file, which is made if there is none; what others have added since stays. Returns the file's size in bytes.
+    ///
+    /// # Errors
+    /// See [`WriteMeshesError`]; then the file is as it was.
+    pub fn update_light_meshes(&self, path: &Path, settings: &Settings) -> Result<u64, WriteMeshesError> {
+        let of = MeshScene { scene: &self.scene, lights: self.lights.of_settings(settings), settings };
+        self.meshes.update_file(path, of)
     }
 
     /// DirectLight of eq. (1) at positions in free space, linear RGB, with the visibility of every light traced; needs no
@@ -143,18 +218,34 @@ pub fn render(
     let mut meshes = LightMeshes::new(scene.bounds());
     let lights = lights.of_settings(settings);
     let world = World { accel: backend, scene, lights, emissive: &emissive };
-    render_world(world, camera, settings, &mut meshes, &(), &StopToken::default())
+    let shown = Shown { camera, sink: &(), stop: &StopToken::default(), purpose: Purpose::Image };
+    render_world(world, shown, settings, &mut meshes)
+}
+
+/// A view, who receives it, and what for.
+struct Shown<'a> {
+    camera: &'a Camera,
+    sink: &'a dyn TileSink,
+    stop: &'a StopToken,
+    purpose: Purpose,
 }
 
 fn render_world<A: Accel>(
     world: World<A>,
-    camera: &Camera,
+    shown: Shown,
     settings: &Settings,
     meshes: &mut LightMeshes,
-    sink: &dyn TileSink,
-    stop: &StopToken,
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
+    let Shown { camera, sink, stop, purpose } = shown;
     camera.validate()?;
-    View { world, camera, sink, stop }.render(settings, meshes)
+    let known = meshes.known_view(camera, settings).cloned();
+    let settled = known.as_ref().map(|known| known.settled.settings(settings));
+    let view = View { world, camera, sink, stop, known: known.as_ref(), purpose };
+    let (image, mut stats) = view.render(settled.as_ref().unwrap_or(settings), meshes)?;
+    if let Some(known) = known {
+        stats.accuracy = known.accuracy;
+    }
+    meshes.remember(camera, settings, &stats);
+    Ok((image, stats))
 }

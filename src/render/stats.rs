@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::accuracy::Accuracy;
 use super::reason::Choice;
+use super::settled::Settled;
 use crate::light_mesh::direct::DirectEvaluation;
 use crate::light_mesh::indirect::IndirectEvaluation;
 use crate::light_mesh::surface::SurfaceEvaluation;
@@ -89,6 +90,9 @@ pub struct RenderStats {
     pub light_mesh_bytes: u64,
     /// How wrong the picture is; `None` where nobody asked.
     pub accuracy: Option<Accuracy>,
+    /// What was found for what the settings left open.
+    #[serde(skip)]
+    pub settled: Option<Settled>,
 }
 
 /// The error that hybrid shadows estimate of themselves, over some surface points.

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::accuracy::{Accuracy, Ending};
 use super::error::RenderError;
 use super::fixed::View;
+use super::frame::Purpose;
 use super::meshes::LightMeshes;
 use super::stats::RenderStats;
 use crate::accel::Accel;
@@ -25,6 +26,9 @@ impl<A: Accel> View<'_, A> {
         // Before anything is tried: bits belong to the lights that they are of.
         meshes.renew_lights(self.world.lights);
         let limits = settings.limits;
+        let whole = (!self.is_local(settings)).then(|| self.whole(settings));
+        let settings = whole.as_ref().unwrap_or(settings);
+        let purpose = if whole.is_some() { Purpose::Image } else { self.purpose };
         let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
         // Who is short of time needs a first picture soon.
         let steps = if deadline.is_some() { limits.steps.max(2) } else { limits.steps };
@@ -34,7 +38,7 @@ impl<A: Accel> View<'_, A> {
             let last = step == steps;
             // The first picture is finished in any case.
             let stop = self.stop.with_deadline(deadline.filter(|_| best.is_some()));
-            let view = View { stop: &stop, ..*self };
+            let view = View { stop: &stop, purpose, ..*self };
             let rendered = if last {
                 view.render_measured(settings, asked, meshes)
             } else {
@@ -62,6 +66,21 @@ impl<A: Accel> View<'_, A> {
             }
         }
         best.ok_or(RenderError::Stopped)
+    }
+
+    /// Whether part of a picture can be made without the rest of it: where nothing is measured, which takes all of it.
+    fn is_local(&self, settings: &Settings) -> bool {
+        let limits = settings.limits;
+        limits.steps == 1
+            && limits.time.is_none()
+            && !self.is_measured(settings, limits.max_error.unwrap_or(0.0))
+    }
+
+    /// Settings for the whole picture.
+    fn whole(&self, settings: &Settings) -> Settings {
+        let mut settings = settings.clone();
+        settings.view.crop = None;
+        settings
     }
 
     /// Settings of a picture that comes some steps before the last: mesh points as often twice as far apart, shadows without edges of their

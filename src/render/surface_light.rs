@@ -16,7 +16,7 @@ use crate::scene::Camera;
 use crate::settings::{Normalization, Settings};
 use crate::simd::vectorize;
 
-/// Evaluates what the view of a frame needs of a surface mesh.
+/// Evaluates what the view of a frame needs of a surface mesh: its records, if they are `known`.
 ///
 /// # Errors
 /// [`RenderError::Stopped`].
@@ -24,19 +24,23 @@ pub fn evaluate_surface_light<A: Accel>(
     frame: &mut Frame<A>,
     mesh: &mut SurfaceMesh,
     camera: &Camera,
-    settings: &Settings,
+    known: Option<&[(u32, u32)]>,
     stats: &mut RenderStats,
 ) -> Result<(), RenderError> {
-    let (world, resolution) = (frame.world, settings.view.resolution);
+    let (world, resolution) = (frame.world, frame.view.resolution);
     mesh.turn_to(SurfaceView { footprint: camera.pixel_footprint(resolution), height: resolution.1 });
-    frame.trace_image(stats, |paths, stats| {
-        let mut seconds = stats.seconds.mesh;
-        timed(&mut seconds, || {
-            let surfaces = paths.iter().map(|paths| paths.surfaces().collect()).collect();
-            stats.add_surface(mesh.need(world, surfaces));
-        });
-        stats.seconds.mesh = seconds;
-    })?;
+    if let Some(records) = known {
+        mesh.need_again(records);
+    } else {
+        frame.trace_image(stats, |paths, stats| {
+            let mut seconds = stats.seconds.mesh;
+            timed(&mut seconds, || {
+                let surfaces = paths.iter().map(|paths| paths.surfaces().collect()).collect();
+                stats.add_surface(mesh.need(world, surfaces));
+            });
+            stats.seconds.mesh = seconds;
+        })?;
+    }
     let mut seconds = stats.seconds.mesh;
     timed(&mut seconds, || stats.add_surface(mesh.evaluate(world)));
     stats.seconds.mesh = seconds;

@@ -1,5 +1,7 @@
 //! How the image is cut up: tiles for the threads, blocks of tiles for the memory.
 
+use crate::image::Window;
+
 /// Edge of a tile in pixels. Tiles lie on a fixed raster, so that neither the number of threads nor the
 /// block size changes which rays travel together.
 pub const TILE: u32 = 32;
@@ -27,6 +29,12 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Its place in the image.
+    pub fn window(&self) -> Window {
+        let Self { x, y, width, height } = *self;
+        Window { x, y, width, height }
+    }
+
     /// Number of pixels.
     pub fn pixels(&self) -> usize {
         (self.width * self.height) as usize

@@ -1,6 +1,7 @@
 //! Light sources and their falloff.
 
 use glam::{Affine3A, DMat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// Light i of eq. (1): a point light, or one of the two other kinds that models bring.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +117,7 @@ fn unit(vector: Vec3) -> Vec3 {
 }
 
 /// φ1(t), what intensities are divided by at distance t.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Falloff {
     /// c + t, the paper's.
     Linear {

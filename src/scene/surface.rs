@@ -1,6 +1,7 @@
 //! Surface points, and what a ray finds out about them.
 
 use glam::{Mat3A, Vec2, Vec3, Vec3A};
+use serde::{Deserialize, Serialize};
 
 use super::ray::Hit;
 use super::scene::Scene;
@@ -10,7 +11,7 @@ use crate::simd::{LANES, Lanes, horizontal_sum};
 /// A visible surface point y (docs/method.md §1).
 ///
 /// Both normals are unit length and face the side from which the point was seen (docs/method.md §7).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
     /// y in world space, on the triangle to within rounding.
     pub position: Vec3,

@@ -44,6 +44,11 @@ impl Texture {
         (count > 0 && texels.len() as u64 == count).then_some(Self { width, height, texels })
     }
 
+    /// Width, height and texels.
+    pub(super) fn contents(&self) -> (u32, u32, &[[u8; 4]]) {
+        (self.width, self.height, &self.texels)
+    }
+
     /// Whether some texel is not fully opaque.
     pub(super) fn has_transparency(&self) -> bool {
         self.texels.iter().any(|texel| texel[3] != u8::MAX)

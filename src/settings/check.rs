@@ -47,6 +47,9 @@ impl Settings {
             view.resolution,
             (1..=MAX_PIXELS).contains(&pixels),
         )?;
+        if let Some(crop) = view.crop {
+            check("view.crop", "lie within the resolution", crop, crop.is_within(view.resolution))?;
+        }
         let one_or_more = |name, count: u32| check(name, "be at least 1", count, count >= 1);
         one_or_more("view.samples_per_pixel", view.samples_per_pixel)?;
         if let Some(width) = view.filter_width {
@@ -82,7 +85,11 @@ impl Settings {
 }
 
 impl PointSettings {
-    fn check(&self) -> Result<(), SettingsError> {
+    /// Checks all ranges.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
+    pub(crate) fn check(&self) -> Result<(), SettingsError> {
         if let Spacing::Units(spacing) = self.spacing {
             let holds = spacing.to_array().into_iter().all(is_length);
             check("points.spacing", "be finite and above 0", spacing, holds)?;
@@ -105,6 +112,7 @@ impl PointSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Window;
     use crate::settings::IndirectSettings;
     use glam::Vec3;
 
@@ -119,6 +127,8 @@ mod tests {
             settings.check().expect_err("out of range").name
         };
         assert_eq!(refused(&|s| s.view.resolution = (0, 5)), "view.resolution");
+        let beyond = Window { x: 700, y: 0, width: 101, height: 1 };
+        assert_eq!(refused(&|s| s.view.crop = Some(beyond)), "view.crop");
         assert_eq!(refused(&|s| s.view.samples_per_pixel = 0), "view.samples_per_pixel");
         assert_eq!(refused(&|s| s.view.filter_width = Some(f32::NAN)), "view.filter_width");
         assert_eq!(refused(&|s| s.shading.reference_samples = 0), "shading.reference_samples");

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::names::named_enum;
 use super::shading::{KernelSettings, Radius};
@@ -118,7 +119,7 @@ named_enum! {
 }
 
 /// Layout of mesh points (method §8).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum PointLayout {
     /// Regular grid: the paper's.
     Regular,

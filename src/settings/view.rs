@@ -5,6 +5,7 @@ use std::f32::consts::TAU;
 use glam::Vec2;
 
 use super::names::named_enum;
+use crate::image::Window;
 use crate::sampling::{InverseCdf, MOST_DOUBLED, pixel_pattern};
 
 named_enum! {
@@ -77,6 +78,8 @@ pub struct ViewSettings {
     /// Samples per image block, which bounds the memory for camera paths and never changes the image;
     /// `None` for a good default.
     pub block_samples: Option<u64>,
+    /// The part of the image that is rendered, within the resolution; its pixels are those of the whole image, the others stay black. `None` for all.
+    pub crop: Option<Window>,
 }
 
 impl ViewSettings {
@@ -102,6 +105,7 @@ impl Default for ViewSettings {
             max_depth: 5,
             weight_threshold: 1e-3,
             block_samples: None,
+            crop: None,
         }
     }
 }

@@ -53,6 +53,9 @@ fn must_not_panic(bytes: &[u8]) {
     if let Ok(image) = image::decode(bytes) {
         assert_eq!(image.pixels().len(), image.width() as usize * image.height() as usize);
     }
+    if let Ok(image) = image::exr::decode_channels(bytes) {
+        assert!(image.channels.iter().all(|channel| channel.samples.len() as u64 == image.window.pixels()));
+    }
 }
 
 /// Every prefix of a file lacks something.
@@ -64,6 +67,7 @@ fn truncated_files_are_errors() {
             // The last 12 bytes of a PNG are an empty chunk that says that it ends there.
             if length < bytes.len() - 12 {
                 assert!(image::decode(&bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
+                assert!(image::exr::decode_channels(&bytes[..length]).is_err(), "{length}: all channels");
             }
         }
     }

@@ -4,6 +4,7 @@
 mod common;
 
 mod animation;
+mod channels;
 mod damaged_images;
 mod failed_images;
 mod formats;

@@ -16,6 +16,7 @@ mod lamps;
 mod lazy;
 mod leaks;
 mod levels;
+mod mesh_file;
 mod moving;
 mod penumbra;
 mod physical;

@@ -12,5 +12,6 @@ mod compare;
 mod frames;
 mod gallery;
 mod memory;
+mod pipeline;
 mod same_bytes;
 mod views;

@@ -40,6 +40,7 @@ mod instance;
 mod layout;
 #[cfg(feature = "runtime")]
 mod library;
+mod mapped_file;
 pub mod packet;
 pub mod placement;
 #[cfg(feature = "runtime")]
@@ -48,6 +49,8 @@ mod query;
 mod ray;
 #[cfg(feature = "runtime")]
 mod scene;
+
+pub use self::mapped_file::MappedFile;
 
 #[cfg(feature = "runtime")]
 pub use self::{

@@ -19,13 +19,26 @@ use crate::simd::{LANES, Lanes};
 pub struct FieldEstimator<'a> {
     /// The field.
     pub field: &'a DirectField,
+    /// Its visibility bits, which don't have to be found again for every point.
+    bits: &'a [VisibilityBits],
     /// The lights.
     pub lights: &'a PackedLights,
     /// How direct illumination follows from them.
     pub estimator: Estimator,
 }
 
-impl FieldEstimator<'_> {
+impl<'a> FieldEstimator<'a> {
+    /// An estimator over a field.
+    pub fn new(field: &'a DirectField, lights: &'a PackedLights, estimator: Estimator) -> Self {
+        Self { field, bits: field.bits(), lights, estimator }
+    }
+
+    /// Visibility of the lights from the point in `slot`, by chunk of [`LANES`] lights.
+    #[inline(always)]
+    pub fn bits(&self, slot: u32, chunks: usize) -> &'a [VisibilityBits] {
+        &self.bits[slot as usize * chunks..][..chunks]
+    }
+
     /// I(y), the direct illumination of a surface point without its k_d, from known points with weights.
     #[inline(always)]
     pub fn estimate(&self, surface: &SurfacePoint, points: &Neighbours) -> Vec3 {
@@ -80,7 +93,7 @@ impl Differ for FieldEstimator<'_> {
         match Basis::of(self.estimator) {
             Basis::Bits => {
                 let chunks = self.lights.chunks().len();
-                lights_differ(slots.iter().map(|&slot| self.field.bits(slot, chunks)))
+                lights_differ(slots.iter().map(|&slot| self.bits(slot, chunks)))
             }
             // Not a look at each light, since the cost of these must not grow with the lights.
             basis @ (Basis::Light | Basis::Irradiance) => {
@@ -101,11 +114,12 @@ struct MeanVisibility<'a> {
 impl Visibility for MeanVisibility<'_> {
     #[inline(always)]
     fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
-        let Self { estimator: FieldEstimator { field, lights, .. }, points, scale } = self;
+        let Self { estimator, points, scale } = self;
+        let lights = estimator.lights;
         let chunks = lights.chunks().len();
         let (mut all, mut any) = (VisibilityBits::MAX, 0);
         for &slot in points.slots() {
-            let bits = field.bits(slot, chunks)[index];
+            let bits = estimator.bits(slot, chunks)[index];
             all &= bits;
             any |= bits;
         }
@@ -118,7 +132,7 @@ impl Visibility for MeanVisibility<'_> {
         }
         let mut visible: Lanes = [0.0; LANES];
         for (slot, weight) in points.iter() {
-            let bits = field.bits(slot, chunks)[index];
+            let bits = estimator.bits(slot, chunks)[index];
             for (lane, sum) in visible.iter_mut().enumerate() {
                 *sum += if bits >> lane & 1 == 1 { weight } else { 0.0 };
             }

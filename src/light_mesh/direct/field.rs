@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::derived::{Basis, DerivedValues, derive_irradiance, derive_light};
 use super::spherical_harmonics;
+use super::stored_bits::StoredBits;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
 use crate::lights::{PackedLights, VisibilityBits};
 use crate::simd::LANES;
@@ -15,7 +16,7 @@ use crate::simd::LANES;
 /// ray. Those are caches, filled for the estimators that read them and emptied when the lights' intensities change.
 #[derive(Default)]
 pub struct DirectField {
-    pub(super) bits: Vec<VisibilityBits>,
+    pub(super) bits: StoredBits,
     /// The bits that something moved in front of, by slot and chunk as `bits`; those of points behind its end are all right.
     pub(super) stale: Vec<VisibilityBits>,
     light: DerivedValues,
@@ -23,10 +24,25 @@ pub struct DirectField {
 }
 
 impl DirectField {
-    /// Visibility of the lights from the point in `slot`, by chunk of [`LANES`] lights.
-    #[inline(always)]
-    pub(crate) fn bits(&self, slot: u32, chunks: usize) -> &[VisibilityBits] {
-        &self.bits[slot as usize * chunks..][..chunks]
+    /// Visibility of the lights, by slot and chunk of [`LANES`] lights.
+    pub(super) fn bits(&self) -> &[VisibilityBits] {
+        self.bits.as_slice()
+    }
+
+    /// Of points whose bits are known.
+    pub(super) fn of_bits(bits: StoredBits) -> Self {
+        Self { bits, ..Self::default() }
+    }
+
+    /// Adds the bits of some points of another field, whose slots here follow those that are there.
+    pub(super) fn append(&mut self, other: &Self, slots: &[u32], chunks: usize) {
+        if slots.is_empty() || chunks == 0 {
+            return;
+        }
+        let bits = self.bits.to_mut();
+        let known = other.bits();
+        let of_point = |slot: &u32| known.get(*slot as usize * chunks..).and_then(|bits| bits.get(..chunks));
+        bits.extend(slots.iter().flat_map(|slot| of_point(slot).unwrap_or_default()));
     }
 
     /// DirectLight and the unoccluded DirectLight at the point in `slot`, RGB each.
@@ -58,14 +74,15 @@ impl DirectField {
         if chunks == 0 || points.is_empty() {
             return 0;
         }
-        let first = self.bits.len();
-        self.bits.resize(first + points.len() * chunks, 0);
+        let bits = self.bits.to_mut();
+        let first = bits.len();
+        bits.resize(first + points.len() * chunks, 0);
         // Sixteen points make a packet; a task gets so many that tasks are neither many nor long: without a limit the
         // last one, which nobody can help with, is long (see `TILES_PER_TASK` in the renderer).
         const PACKET: usize = LANES;
         const RAYS_PER_TASK: usize = 1 << 10;
         let packets_per_task = (RAYS_PER_TASK / (PACKET * lights.len())).max(1);
-        self.bits[first..]
+        bits[first..]
             .par_chunks_mut(PACKET * chunks)
             .zip(points.par_chunks(PACKET))
             .with_max_len(packets_per_task)
@@ -77,8 +94,10 @@ impl DirectField {
     pub fn derive(&mut self, lights: &PackedLights, basis: Basis, points: &[Vec3]) {
         match basis {
             Basis::Bits => {}
-            Basis::Light => derive_light(lights, points, &self.bits, &mut self.light),
-            Basis::Irradiance => derive_irradiance(lights, points, &self.bits, &mut self.irradiance),
+            Basis::Light => derive_light(lights, points, self.bits.as_slice(), &mut self.light),
+            Basis::Irradiance => {
+                derive_irradiance(lights, points, self.bits.as_slice(), &mut self.irradiance);
+            }
         }
     }
 
@@ -89,7 +108,8 @@ impl DirectField {
 
     /// Bytes held.
     pub(crate) fn memory_bytes(&self) -> usize {
-        (self.bits.capacity() + self.stale.capacity()) * size_of::<VisibilityBits>()
+        self.bits.memory_bytes()
+            + self.stale.capacity() * size_of::<VisibilityBits>()
             + self.light.memory_bytes()
             + self.irradiance.memory_bytes()
     }

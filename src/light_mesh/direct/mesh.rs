@@ -13,7 +13,7 @@ use crate::light_mesh::leaks::amounts_differ;
 use crate::light_mesh::lookup::{Lookup, LookupScratch};
 use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointPacket, PointSet};
 use crate::light_mesh::slot::UNKNOWN;
-use crate::light_mesh::store::{PointMask, PointStore};
+use crate::light_mesh::store::{NeededPoints, PointMask, PointStore};
 use crate::lights::PackedLights;
 use crate::scene::SurfacePoint;
 use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
@@ -23,8 +23,8 @@ use crate::world::World;
 /// Direct light mesh: points and the field at those that are known. It belongs to one scene's geometry and to its lights'
 /// places and kinds; how surface points interpolate it is no part of it.
 pub struct DirectMesh {
-    store: PointStore,
-    field: DirectField,
+    pub(super) store: PointStore,
+    pub(super) field: DirectField,
 }
 
 /// How surface points interpolate a direct mesh.
@@ -79,6 +79,13 @@ impl DirectMesh {
         let set = &mut self.store.points;
         let neighbourhoods = Neighbourhoods::new(set, points, kernel, auto)?;
         Ok(DirectInterpolation { neighbourhoods, leaks: kernel.leaks, estimator })
+    }
+
+    /// All points in a box that surface points there might be interpolated from.
+    pub fn points_in(&self, interpolation: &DirectInterpolation, bounds: Bounds) -> PointMask {
+        let mut found = NeededPoints::default();
+        interpolation.neighbourhoods.for_each_in(&self.store.points, bounds, |id| found.insert(id));
+        PointMask::union(found.into_bricks())
     }
 
     /// Evaluates those of the needed points that are unknown, and whatever `interpolation` reads of all known ones beside.
@@ -166,7 +173,7 @@ impl DirectMesh {
         let DirectInterpolation { neighbourhoods, leaks, estimator } = interpolation;
         DirectView {
             lookup: Lookup { store: &self.store, neighbourhoods, leaks: *leaks },
-            estimator: FieldEstimator { field: &self.field, lights, estimator: *estimator },
+            estimator: FieldEstimator::new(&self.field, lights, *estimator),
         }
     }
 

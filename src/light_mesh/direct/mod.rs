@@ -7,9 +7,11 @@ mod field;
 mod mesh;
 mod moved;
 mod refine;
+mod saved;
 // For tests and benches only.
 #[doc(hidden)]
 pub mod spherical_harmonics;
+mod stored_bits;
 mod witnesses;
 
 pub(crate) use estimators::FieldEstimator;

@@ -69,7 +69,7 @@ impl DirectField {
         if chunks == 0 {
             return KeptBits { points_kept: points.len() as u64, ..KeptBits::default() };
         }
-        self.stale.resize(self.bits.len(), 0);
+        self.stale.resize(self.bits().len(), 0);
         let marked = self.stale.par_chunks_mut(GROUP * chunks).zip(points.par_chunks(GROUP));
         let kept = marked.map(|(stale, points)| vectorize(Mark { lights, points, motion, stale }));
         kept.reduce(KeptBits::default, |a, b| KeptBits {
@@ -99,11 +99,13 @@ impl DirectField {
     ) -> u64 {
         let chunks = lights.chunks().len();
         let Self { bits, stale, .. } = self;
+        let known = bits.as_slice();
         let traced: Vec<(Vec<VisibilityBits>, u64)> = slots
             .par_chunks(GROUP)
             .with_max_len(1)
-            .map(|slots| retrace_group(accel, lights, points, slots, bits, stale))
+            .map(|slots| retrace_group(accel, lights, points, slots, known, stale))
             .collect();
+        let bits = bits.to_mut();
         let mut rays = 0;
         for (slots, (new, count)) in slots.chunks(GROUP).zip(&traced) {
             rays += count;

@@ -32,7 +32,7 @@ impl DirectField {
             .with_max_len(1)
             .map(|(bits, (points, corners))| self.refine_group(accel, lights, points, corners, bits))
             .sum();
-        self.bits.extend(bits);
+        self.bits.to_mut().extend(bits);
         rays
     }
 
@@ -45,6 +45,7 @@ impl DirectField {
         bits: &mut [VisibilityBits],
     ) -> u64 {
         let chunks = lights.chunks().len();
+        let known = self.bits();
         let mut rays = 0;
         for (index, chunk) in lights.chunks().iter().enumerate() {
             let mut open = [0 as VisibilityBits; GROUP];
@@ -52,7 +53,7 @@ impl DirectField {
             for (point, corners) in corners.iter().enumerate() {
                 let (mut all, mut any) = (VisibilityBits::MAX, 0);
                 for &slot in corners {
-                    let seen = self.bits(slot, chunks)[index];
+                    let seen = known[slot as usize * chunks + index];
                     all &= seen;
                     any |= seen;
                 }

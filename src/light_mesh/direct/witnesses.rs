@@ -40,7 +40,7 @@ impl Witnesses {
         any.clear();
         any.resize(chunks, 0);
         for &slot in &*slots {
-            let bits = mesh.estimator.field.bits(slot, chunks);
+            let bits = mesh.estimator.bits(slot, chunks);
             for ((all, any), bits) in all.iter_mut().zip(&mut *any).zip(bits) {
                 *all &= bits;
                 *any |= bits;
@@ -52,7 +52,7 @@ impl Witnesses {
     #[inline(always)]
     pub fn share(&self, mesh: &DirectView, index: usize, light: usize) -> f32 {
         let chunks = mesh.estimator.lights.chunks().len();
-        let sees = |slot: u32| u32::from(mesh.estimator.field.bits(slot, chunks)[index] >> light & 1);
+        let sees = |slot: u32| u32::from(mesh.estimator.bits(slot, chunks)[index] >> light & 1);
         let seeing: u32 = self.slots.iter().map(|&slot| sees(slot)).sum();
         seeing as f32 / self.slots.len() as f32
     }

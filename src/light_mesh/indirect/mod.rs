@@ -10,6 +10,7 @@ mod interpolation;
 mod mesh;
 mod octahedral;
 mod patches;
+mod saved;
 mod solve;
 mod view;
 

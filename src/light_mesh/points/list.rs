@@ -55,6 +55,11 @@ impl PointList {
         Self { origin, inverse_cell, points, cells, first: I64Vec3::ZERO, last }
     }
 
+    /// Number of points.
+    pub fn len(&self) -> u64 {
+        self.points.len() as u64
+    }
+
     /// Lists of points share none with other layouts.
     pub fn id_at(&self, _: Vec3) -> Option<u64> {
         None

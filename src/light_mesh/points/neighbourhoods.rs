@@ -1,6 +1,6 @@
 //! The shape of D_y in every part of space (method §3, §8).
 
-use glam::Vec3;
+use glam::{UVec3, Vec3};
 
 use super::cells::{CellCache, PointPacket, Surroundings};
 use super::kernel::Kernel;
@@ -119,6 +119,31 @@ impl Neighbourhoods {
             count(outer).saturating_sub(inner.map_or(0, |begin| count(within(*begin))))
         };
         if bounds.is_empty() { 0 } else { self.zones.iter().enumerate().map(count).sum() }
+    }
+
+    /// A box in parts of at most some hundred thousand points each.
+    pub(crate) fn parts_of(&self, bounds: Bounds) -> Vec<Bounds> {
+        let finest = self.zones.iter().map(|zone| zone.spacing).fold(f32::INFINITY, f32::min);
+        let side = Vec3::splat(64.0 * finest);
+        let counts = (bounds.extent() / side).ceil().max(Vec3::ONE).min(Vec3::splat(1024.0)).as_uvec3();
+        let side = bounds.extent() / counts.as_vec3();
+        let part = |x: u32, y: u32, z: u32| {
+            let min = bounds.min + UVec3::new(x, y, z).as_vec3() * side;
+            Bounds { min, max: min + side }
+        };
+        let rows = (0..counts.z).flat_map(|z| (0..counts.y).map(move |y| (y, z)));
+        rows.flat_map(|(y, z)| (0..counts.x).map(move |x| part(x, y, z))).collect()
+    }
+
+    /// Calls `each` with all points in a box that have the spacing of the place where they lie.
+    pub(crate) fn for_each_in(&self, points: &PointSet, bounds: Bounds, mut each: impl FnMut(u64)) {
+        for (number, zone) in self.zones.iter().enumerate() {
+            points.for_each_in_box(zone.layer, bounds.min, bounds.max, |id, position| {
+                if bounds.contains(position) && self.zone_number_at(position) == number {
+                    each(id);
+                }
+            });
+        }
     }
 
     #[inline(always)]

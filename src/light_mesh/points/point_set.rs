@@ -81,7 +81,7 @@ impl PointSet {
     ///
     /// # Errors
     /// See [`MeshError`].
-    pub(super) fn layer(
+    pub(crate) fn layer(
         &mut self,
         layout: &PointLayout,
         spacing: Vec3,
@@ -117,6 +117,33 @@ impl PointSet {
         let first_id = (number as u64) << LAYER_SHIFT;
         self.layers.push(Layer { layout: layout.clone(), spacing, positions, first_id, parent, levels });
         Ok(number)
+    }
+
+    /// Layout, spacing and levels of every layer, in the order of their numbers.
+    pub(crate) fn layers(&self) -> impl Iterator<Item = (&PointLayout, Vec3, u32)> {
+        self.layers.iter().map(|layer| (&layer.layout, layer.spacing, layer.levels))
+    }
+
+    /// Number of the layer of a point.
+    pub(crate) fn layer_of(id: u64) -> usize {
+        (id >> LAYER_SHIFT) as usize
+    }
+
+    /// The id of a point whose layer has another number in another set: `layers` has the new ones by the old ones.
+    pub(crate) fn in_layer(id: u64, layers: &[usize]) -> Option<u64> {
+        let layer = *layers.get(Self::layer_of(id))? as u64;
+        Some(layer << LAYER_SHIFT | id & ((1 << LAYER_SHIFT) - 1))
+    }
+
+    /// Whether there are points with the ids from `first` on for which `mask` has bits.
+    pub(crate) fn has_points(&self, first: u64, mask: u64) -> bool {
+        let last = first + u64::from(63 - mask.leading_zeros().min(63));
+        let Some(layer) = self.layers.get(Self::layer_of(first)) else { return false };
+        match &layer.positions {
+            Positions::List(list) => last - layer.first_id < list.len(),
+            // Those of all other layouts go on without an end.
+            Positions::Lattice(_) | Positions::Periodic(_) => Self::layer_of(last) == Self::layer_of(first),
+        }
     }
 
     /// Position of a point.

@@ -2,7 +2,9 @@
 
 mod point_mask;
 mod point_store;
+mod saved;
 mod slots;
 
 pub use point_mask::{NeededPoints, PointMask};
 pub use point_store::PointStore;
+pub use saved::PointSections;

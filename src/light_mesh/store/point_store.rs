@@ -15,7 +15,7 @@ use crate::scene::Scene;
 pub struct PointStore {
     /// The points.
     pub points: PointSet,
-    slots: SlotTable,
+    pub(super) slots: SlotTable,
     /// By slot.
     positions: Vec<Vec3>,
     /// Whether a point lies inside of geometry, by slot, as far as anybody wanted to know.
@@ -26,6 +26,16 @@ impl PointStore {
     /// With no point known.
     pub(crate) fn new(points: PointSet) -> Self {
         Self { points, slots: SlotTable::default(), positions: Vec::new(), inside: Vec::new() }
+    }
+
+    /// Of points that are known already: by slot their positions, and which lie inside of geometry, as far as that was found out.
+    pub(super) fn of_parts(
+        points: PointSet,
+        slots: SlotTable,
+        positions: Vec<Vec3>,
+        inside: Vec<bool>,
+    ) -> Self {
+        Self { points, slots, positions, inside }
     }
 
     /// Makes the needed points known; returns the ids of those that were not, in slot order: their slots are the last ones.
@@ -89,6 +99,11 @@ impl PointStore {
     #[inline(always)]
     pub(crate) fn is_inside(&self, slot: u32) -> bool {
         self.inside.get(slot as usize).is_some_and(|&inside| inside)
+    }
+
+    /// Of how many points it was found out whether they lie inside of geometry.
+    pub(crate) fn inside_len(&self) -> usize {
+        self.inside.len()
     }
 
     /// Finds out which of the first `count` known points lie inside of geometry, once for each; returns the number of rays.

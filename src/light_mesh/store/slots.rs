@@ -81,6 +81,18 @@ impl SlotTable {
         new
     }
 
+    /// Ids of all points that have slots, in ascending order, each with its slot.
+    pub fn known(&self) -> Vec<(u64, u32)> {
+        let mut bricks: Vec<(u64, u32)> =
+            self.directory.iter().map(|(&brick, &entry)| (brick, entry)).collect();
+        bricks.sort_unstable();
+        let slots = |&(brick, entry): &(u64, u32)| {
+            let slots = self.bricks.get(entry as usize).into_iter().flatten();
+            (brick * 64..).zip(slots.copied())
+        };
+        bricks.iter().flat_map(slots).filter(|(_, slot)| *slot != UNKNOWN).collect()
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         // A hash map keeps a byte per place beside key and value.

@@ -1,16 +1,18 @@
 //! Light of lights on the surfaces in a cell: its mean, and which light to ask about at a single point.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::cells::CellPoint;
 use crate::accel::Accel;
 use crate::light_mesh::direct_light::{Candidate, DirectLight};
+use crate::lights::PackedLights;
 use crate::sampling::hash_to_unit_cube;
 use crate::simd::LANES;
 use crate::world::World;
 
 /// What falls on the surfaces that a point stands for from lights.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CellLight {
     /// I, the mean over places spread over them.
     pub mean: Vec3,
@@ -55,6 +57,14 @@ impl CellLight {
         light
     }
 
+    /// Whether the candidates are lights of a scene.
+    pub fn is_among(&self, lights: &PackedLights) -> bool {
+        let candidates = self.candidates.get(..usize::from(self.count));
+        let exists =
+            |(candidate, _): &(Candidate, f32)| (candidate.light as usize) < lights.chunks().len() * LANES;
+        candidates.is_some_and(|candidates| candidates.iter().all(exists))
+    }
+
     /// The candidate for a number in [0, 1): evenly spread numbers choose lights by what they give, those that were seen to be hidden less
     /// often. `None` if no light lies above the horizon.
     #[inline(always)]
@@ -69,7 +79,7 @@ impl CellLight {
 mod tests {
     use super::*;
     use crate::accel::BruteForceAccel;
-    use crate::lights::{EmissiveTriangles, PackedLights, Unoccluded};
+    use crate::lights::{EmissiveTriangles, Unoccluded};
     use crate::scene::{Falloff, Light, Scene, SurfacePoint};
 
     /// What a point of a floor gets by asking about one light for each of many even numbers, over what all lights give it, averaged over

@@ -1,6 +1,7 @@
 //! Cells of space, and the surfaces in them: where the points of a surface mesh lie.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 use crate::sampling::mix;
@@ -109,7 +110,7 @@ impl Cell {
 }
 
 /// A point that stands for a surface in a cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct CellPoint {
     /// The point.
     pub surface: SurfacePoint,

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::directions::{HemisphereDirections, part};
 use super::gather::Gather;
@@ -35,7 +36,7 @@ pub struct SurfaceMesh {
     /// By point: what falls on sources from surfaces over π.
     pub(super) indirect: Vec<Vec3>,
     /// By point: what falls on records from surfaces over π.
-    received: Vec<Vec3>,
+    pub(super) received: Vec<Vec3>,
     /// Records that surface points around each are interpolated from, by point: stretches of `lists`.
     list_of: Vec<Range<u32>>,
     lists: Vec<u32>,
@@ -55,17 +56,24 @@ pub struct SurfaceView {
 }
 
 /// What is known of a point.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct State {
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct State {
     /// Where what it sees is among the looked at, plus one.
     pub(super) looked_at: u32,
     /// Harmonic mean distance of the surfaces that it sees, 0 if it has not been looked at.
     pub(super) distance: f32,
     /// Whether light from surfaces is known: as a record, as a source.
-    received: bool,
+    pub(super) received: bool,
     pub(super) solved: bool,
     /// Surface points of the view that it is the nearest record of: if there are any, it is one.
     pub(super) stands_for: u32,
+}
+
+impl State {
+    /// Forgets what belongs to a view.
+    pub(super) fn leave_view(&mut self) {
+        (self.looked_at, self.stands_for) = (0, 0);
+    }
 }
 
 /// Points are looked at with one in so many directions.

@@ -10,7 +10,10 @@ mod last_place;
 mod mesh;
 mod points;
 mod records;
+mod saved;
+mod saved_points;
 mod solve;
 mod sources;
 
 pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
+pub(crate) use saved::SavedSurfaceMesh;

@@ -21,24 +21,24 @@ pub const FINEST: u8 = 3;
 /// Number of no point.
 pub const NO_POINT: u32 = u32::MAX;
 /// In place of the number of a point that nobody has looked for yet.
-const UNLINKED: u32 = u32::MAX - 1;
+pub(super) const UNLINKED: u32 = u32::MAX - 1;
 
 /// Points by number.
 pub struct SurfacePoints {
     /// The cells.
     pub cells: Cells,
     /// Numbers of the points of each cell that was surveyed: the first, and how many.
-    by_cell: HashMap<u64, (u32, u32), BuildKeyHasher>,
-    points: Vec<CellPoint>,
+    pub(super) by_cell: HashMap<u64, (u32, u32), BuildKeyHasher>,
+    pub(super) points: Vec<CellPoint>,
     /// What a search reads of each, for which memory is waited for more than for anything else.
     sights: Vec<PointSight>,
-    levels: Vec<u8>,
+    pub(super) levels: Vec<u8>,
     /// By point: how many its cell has.
     crowds: Vec<u32>,
     /// What falls on points of level 0 from lights.
     lights: Vec<CellLight>,
     /// By point: the point of level 0 that stands for it, or a reason why there is none.
-    parents: Vec<u32>,
+    pub(super) parents: Vec<u32>,
 }
 
 /// What a search reads of a point.
@@ -203,7 +203,7 @@ impl SurfacePoints {
         surfaces.iter().filter_map(cell).collect()
     }
 
-    fn add(&mut self, key: u64, level: u8, points: &[CellPoint], lights: Vec<CellLight>) {
+    pub(super) fn add(&mut self, key: u64, level: u8, points: &[CellPoint], lights: Vec<CellLight>) {
         self.by_cell.insert(key, (self.points.len() as u32, points.len() as u32));
         self.points.extend_from_slice(points);
         let lit = self.lights.len()..self.lights.len() + lights.len();

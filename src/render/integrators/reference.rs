@@ -131,7 +131,7 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
         let mut field = DirectField::default();
         counters.shadow_rays += field.trace(accel, lights, positions);
         field.derive(lights, Basis::of(self.shading.estimator), positions);
-        let estimator = FieldEstimator { field: &field, lights, estimator: self.shading.estimator };
+        let estimator = FieldEstimator::new(&field, lights, self.shading.estimator);
 
         let leaks = self.shading.kernel.leaks;
         let inside: Vec<bool> = if leaks == Leaks::Invalidate {

@@ -13,6 +13,14 @@ use crate::image::Image;
 use crate::settings::{Estimator, Integrator, Resolve, Settings};
 
 impl<A: Accel> View<'_, A> {
+    /// Whether the error of a picture by these settings is measured.
+    pub(super) fn is_measured(&self, settings: &Settings, asked: f32) -> bool {
+        let shading = &settings.shading;
+        let is_linear = matches!(shading.estimator, Estimator::PerLight | Estimator::Directional);
+        let is_mesh = matches!(shading.integrator, Integrator::Auto | Integrator::LightMesh);
+        asked > 0.0 && !self.world.lights.is_empty() && is_linear && is_mesh
+    }
+
     /// Renders with an error of at most `asked`, if it is above 0 and can be measured.
     pub(super) fn render_measured(
         &self,
@@ -21,9 +29,7 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
         let shading = &settings.shading;
-        let is_linear = matches!(shading.estimator, Estimator::PerLight | Estimator::Directional);
-        let is_mesh = matches!(shading.integrator, Integrator::Auto | Integrator::LightMesh);
-        if asked <= 0.0 || self.world.lights.is_empty() || !is_linear || !is_mesh {
+        if !self.is_measured(settings, asked) {
             let (image, mut stats) = self.render_fixed(settings, meshes)?;
             if asked > 0.0 {
                 let exact = shading.integrator == Integrator::Conventional || self.world.lights.is_empty();

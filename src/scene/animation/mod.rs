@@ -78,6 +78,11 @@ impl Animation {
             && self.cameras.is_empty()
     }
 
+    /// Whether more than cameras moves.
+    pub fn moves_scene(&self) -> bool {
+        !(self.instances.is_empty() && self.lights.is_empty())
+    }
+
     /// Frames per second.
     pub fn frames_per_second(&self) -> f64 {
         self.frames_per_second

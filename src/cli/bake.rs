@@ -1,0 +1,159 @@
+//! `lightmesh bake`: a scene's light mesh as a file.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::error::{CommandError, Outcome};
+use super::frames::FrameArgs;
+use super::interrupt::Interrupt;
+use super::overrides::Overrides;
+use super::parse;
+use super::ready::{ReadyScene, camera_of, ready_scene};
+use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
+use crate::Bounds;
+use crate::image::OutputFile;
+use crate::light_mesh::file::MeshFileError;
+use crate::render::{RenderError, Session};
+use crate::scene::Camera;
+use crate::settings::Settings;
+
+/// What `bake` takes.
+#[derive(Args, Debug)]
+pub struct BakeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Light mesh to write; one that is there and belongs to the scene is added to
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Camera whose view is made known, by name; may be given several times; all cameras of the scene if nothing else is asked for
+    #[arg(long, value_name = "NAME")]
+    camera: Vec<String>,
+    /// Evaluate all mesh points of direct light in the whole scene
+    #[arg(long)]
+    whole: bool,
+    /// Evaluate all mesh points of direct light in a box, given by two corners; may be given several times
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse::bounds)]
+    boxes: Vec<Bounds>,
+    #[command(flatten)]
+    quiet: QuietArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    frames: FrameArgs,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+/// Writes the light mesh.
+///
+/// # Errors
+/// See [`CommandError`]; then the file is as it was.
+pub fn run(args: &BakeArgs) -> Result<Outcome, CommandError> {
+    OutputFile::new(&args.output)?;
+    args.threads.pool()?.install(|| bake(args))?;
+    Ok(Outcome::Passed)
+}
+
+fn bake(args: &BakeArgs) -> Result<(), CommandError> {
+    let start = Instant::now();
+    let reporter = args.quiet.reporter();
+    let frames = &args.frames;
+    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, frames, &reporter)?;
+    let ReadyScene { mut session, cameras, animation, settings, .. } = ready;
+    match session.read_light_meshes(&args.output, &settings) {
+        Err(MeshFileError::Read(error)) if error.kind() == std::io::ErrorKind::NotFound => {}
+        read => {
+            read.map_err(|source| CommandError::LightMesh { file: args.output.clone(), source })?;
+        }
+    }
+    let named = args.camera.iter().map(|name| camera_of(&args.scene, &cameras, Some(name)));
+    let mut seen = named.collect::<Result<Vec<_>, _>>()?;
+    let mut boxes = args.boxes.clone();
+    if args.whole {
+        boxes.push(session.scene().bounds());
+    }
+    if seen.is_empty() && boxes.is_empty() {
+        seen.extend(cameras.iter().enumerate());
+    }
+    let views: Vec<Camera> = match args.frames.numbers(&animation, &args.scene.path)? {
+        None => seen.into_iter().map(|(_, camera)| camera.clone()).collect(),
+        Some(numbers) => {
+            if animation.moves_scene() {
+                return Err(CommandError::MovingBake { scene: args.scene.path.clone() });
+            }
+            let views = numbers.into_iter().flat_map(|number| {
+                let frame = animation.frame(number);
+                seen.iter().map(move |&(index, still)| frame.camera(index, still)).collect::<Vec<_>>()
+            });
+            views.collect()
+        }
+    };
+    let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
+    let stop = &interrupt.stop;
+    let (mut evaluated, mut rays) = (0, 0);
+    let (width, height) = settings.view.resolution;
+    for camera in &views {
+        let bar = reporter.bar("baking");
+        bar.set(0, u64::from(width) * u64::from(height));
+        let prepared = session.prepare(camera, &settings, &bar, stop);
+        bar.finish();
+        let stats = prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
+        evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
+        rays += stats.rays.shadow + stats.rays.indirect;
+    }
+    let (_, eye) = camera_of(&args.scene, &cameras, None)?;
+    for bounds in boxes {
+        let spinner = reporter.spinner("baking");
+        let prepared = session.prepare_box(bounds, eye, &settings, stop);
+        spinner.finish_and_clear();
+        let evaluation =
+            prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
+        evaluated += evaluation.evaluated;
+        rays += evaluation.shadow;
+    }
+    let bytes = session.update_light_meshes(&args.output, &settings)?;
+    reporter.line(&format!(
+        "{}: {evaluated} points evaluated with {rays} rays in {:.2} s, {:.1} MB",
+        args.output.display(),
+        start.elapsed().as_secs_f64(),
+        bytes as f64 / 1e6
+    ));
+    Ok(())
+}
+
+/// Why baking ended; where a signal did that, what is known by then is kept.
+fn stopped(
+    args: &BakeArgs,
+    session: &Session,
+    settings: &Settings,
+    interrupt: &Interrupt,
+    source: RenderError,
+) -> Result<CommandError, CommandError> {
+    let Some(exit_code) = interrupt.exit_code().filter(|_| matches!(source, RenderError::Stopped)) else {
+        return Ok(CommandError::Render { scene: args.scene.path.clone(), source });
+    };
+    session.update_light_meshes(&args.output, settings)?;
+    let kept = format!("{} has what was evaluated; the same command goes on", args.output.display());
+    Ok(CommandError::Interrupted { exit_code, kept })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// Corners may be given in any order.
+    #[test]
+    fn boxes_have_two_corners() {
+        let bounds = parse::bounds("1,2,3,0,5,-1").unwrap();
+        assert_eq!((bounds.min, bounds.max), (Vec3::new(0.0, 2.0, -1.0), Vec3::new(1.0, 5.0, 3.0)));
+        assert!(parse::bounds("1,2,3").is_err() && parse::bounds("1,2,3,4,5,x").is_err());
+    }
+}

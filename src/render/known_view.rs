@@ -1,0 +1,47 @@
+//! Views that were rendered before: what was found for them need not be found again.
+
+use serde::{Deserialize, Serialize};
+
+use super::accuracy::{Accuracy, Ending};
+use super::settled::Settled;
+use super::stats::RenderStats;
+use crate::scene::{Camera, Fingerprint};
+use crate::settings::{OutputSettings, Settings};
+
+/// What was found for a view.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct KnownView {
+    /// Of the camera and the settings.
+    pub identity: Fingerprint,
+    /// What was chosen where the settings left it open.
+    pub settled: Settled,
+    /// How wrong its image was.
+    pub accuracy: Option<Accuracy>,
+    /// Points on surfaces that it is interpolated from: numbers, and how many surface points each is the nearest of.
+    pub records: Vec<(u32, u32)>,
+}
+
+impl KnownView {
+    /// A view that was rendered; `None` if it might have been better with more time.
+    pub fn of(
+        camera: &Camera,
+        settings: &Settings,
+        stats: &RenderStats,
+        records: Vec<(u32, u32)>,
+    ) -> Option<Self> {
+        let accuracy = stats.accuracy;
+        let is_whole = accuracy.is_none_or(|accuracy| accuracy.ending != Ending::Time);
+        let identity = identity(camera, settings);
+        let known = |settled| Self { identity, settled, accuracy, records };
+        stats.settled.filter(|_| is_whole).map(known)
+    }
+}
+
+/// What makes two views the same: all but which part of them is rendered and how it is written.
+pub(super) fn identity(camera: &Camera, settings: &Settings) -> Fingerprint {
+    let mut settings = settings.clone();
+    settings.view.crop = None;
+    settings.view.block_samples = None;
+    settings.output = OutputSettings::default();
+    Fingerprint::of(&(camera, settings))
+}

@@ -1,0 +1,50 @@
+//! What a render finds for what its settings leave open.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::settings::{Estimator, Integrator, Radius, Settings, Spacing};
+
+/// The settings that a render may choose by itself, as one of its pictures has them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settled {
+    integrator: Integrator,
+    estimator: Estimator,
+    tolerance: f32,
+    /// `None` where it follows from the view.
+    spacing: Option<Vec3>,
+    radius: Option<f32>,
+}
+
+impl Settled {
+    /// As a picture has them that is made by an integrator and these settings.
+    pub(super) fn of(integrator: Integrator, settings: &Settings) -> Self {
+        let shading = &settings.shading;
+        let spacing = match settings.mesh.direct.spacing {
+            Spacing::Auto => None,
+            Spacing::Units(spacing) => Some(spacing),
+        };
+        let radius = match shading.kernel.radius {
+            Radius::Units(radius) => Some(radius),
+            Radius::Spacings(_) => None,
+        };
+        Self { integrator, estimator: shading.estimator, tolerance: shading.tolerance, spacing, radius }
+    }
+
+    /// The settings of that picture, given those that left it open: nothing is measured any more.
+    pub(super) fn settings(&self, asked: &Settings) -> Settings {
+        let mut settings = asked.clone();
+        settings.limits.max_error = None;
+        (settings.limits.steps, settings.limits.time) = (1, None);
+        let shading = &mut settings.shading;
+        (shading.integrator, shading.estimator) = (self.integrator, self.estimator);
+        shading.tolerance = self.tolerance;
+        if let Some(spacing) = self.spacing {
+            settings.mesh.direct.spacing = Spacing::Units(spacing);
+        }
+        if let Some(radius) = self.radius {
+            shading.kernel.radius = Radius::Units(radius);
+        }
+        settings
+    }
+}
