@@ -49,8 +49,8 @@ pub fn frames(text: &str) -> Result<Frames, String> {
     }
     let mut sorted = numbers.clone();
     sorted.sort_unstable();
-    match sorted.array_windows().find(|[a, b]| a == b) {
-        Some([twice, _]) => Err(format!("frame {twice} is named twice")),
+    match sorted.iter().zip(sorted.iter().skip(1)).find(|(a, b)| a == b) {
+        Some((twice, _)) => Err(format!("frame {twice} is named twice")),
         None => Ok(Frames::Numbers(numbers)),
     }
 }
@@ -176,21 +176,26 @@ pub fn move_to(
 
 fn in_words(moved: &Moved) -> String {
     let Moved { instances, lights, known } = moved;
-    let bits = known.bits_kept + known.bits_forgotten;
-    let kept = if bits == 0 {
-        "nothing known yet".to_owned()
+    let points = known.points_kept + known.points_changed;
+    let kept = if points == 0 {
+        "nothing is known yet".to_owned()
+    } else if known.bits_forgotten == 0 {
+        format!("kept: all that {points} mesh points see of lights")
     } else {
-        let share = 100.0 * known.bits_kept as f64 / bits as f64;
-        let points = known.points_kept + known.points_changed;
+        let share = 100.0 * known.bits_kept as f64 / (known.bits_kept + known.bits_forgotten) as f64;
         format!(
-            "{share:.1} % of what mesh points see of lights kept, all of it at {} of {points}",
+            "kept: {share:.1} % of what mesh points see of lights, all at {} of {points}",
             known.points_kept
         )
     };
     if *instances == 0 && *lights == 0 {
         return kept;
     }
-    format!("{instances} instances and {lights} lights moved; {kept}")
+    format!("moved: {}, {}; {kept}", counted(*instances, "instance"), counted(*lights, "light"))
+}
+
+fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
 /// The name of a file in a frame: the number in place of #### in the file's name, with as many digits at least, or of %04d as in C; `None` without

@@ -55,7 +55,7 @@ impl Written {
         }
     }
 
-    /// What is stored in the image: nothing that differs from run to run.
+    /// What is stored in the image: nothing that differs from run to run, nor with what was known before.
     pub fn metadata(&self, exposure: f32, stats: &RenderStats) -> Vec<(String, String)> {
         let entry = |key: &str, value: String| (key.to_owned(), value);
         let mut entries = vec![
@@ -67,7 +67,6 @@ impl Written {
             entry(RENDER, self.render.to_string()),
             entry(PART, self.part.clone()),
             entry("lightmesh:exposure", exposure.to_string()),
-            entry("lightmesh:shadow_rays", stats.rays.shadow.to_string()),
         ];
         if let Some(found) = stats.accuracy.and_then(|accuracy| accuracy.found) {
             entries.push(entry("lightmesh:error", found.error.to_string()));

@@ -163,7 +163,8 @@ fn check(times: &[f64], each: usize, found: usize) -> Result<(), CurveError> {
     if let Some(&time) = times.iter().find(|time| !time.is_finite()) {
         return Err(CurveError::Time(time));
     }
-    if let Some([before, after]) = times.array_windows().find(|[before, after]| before > after) {
+    let mut pairs = times.iter().zip(times.iter().skip(1));
+    if let Some((before, after)) = pairs.find(|(before, after)| before > after) {
         return Err(CurveError::Order(*before, *after));
     }
     let expected = each * times.len();
