@@ -127,7 +127,7 @@ fn layers_add_up_to_the_picture() {
             let colours = |name: &str| layer(&layers, name, "RGB");
             let rest = ["indirect", "emission", "reflection"].map(colours).to_vec();
             let direct = colours("direct");
-            assert_sum(&image, &[&[direct.clone()], &rest[..]].concat(), &what);
+            assert_sum(&image, &[std::slice::from_ref(&direct), &rest[..]].concat(), &what);
             let groups = ["light_default", "light_key", "light_rim"].map(colours);
             assert_sum(&image, &[&groups[..], &rest[..]].concat(), &format!("groups of {what}"));
             // None of them is empty, or the sums would say nothing about it.
@@ -176,6 +176,45 @@ fn a_group_is_the_scene_under_its_lights_alone() {
             }
         }
     }
+}
+
+/// Traced shadow edges know of each light what `conventional` does, to within their tolerance of a hundredth of the light; also where several
+/// samples of a pixel smooth them.
+#[test]
+fn groups_of_traced_shadows_are_those_of_conventional_ones() {
+    let scene = scene();
+    for samples in [1, 16] {
+        let mut settings = settings_at((70, 45));
+        settings.view.samples_per_pixel = samples;
+        settings.shading.resolve = Resolve::Trace;
+        let mut by = |integrator| {
+            settings.shading.integrator = integrator;
+            rendered(&scene, &settings, LayerChoice { layers: Vec::new(), light_groups: true }).1
+        };
+        let (traced, conventional) = (by(Integrator::LightMesh), by(Integrator::Conventional));
+        for group in ["default", "key", "rim"] {
+            let values = |layers| layer(layers, &format!("light_{group}"), "RGB");
+            let (traced, conventional) = (values(&traced), values(&conventional));
+            let pairs = || traced.as_flattened().iter().zip(conventional.as_flattened());
+            let wrong: f32 = pairs().map(|(a, b)| (a - b).abs()).sum();
+            let all: f32 = pairs().map(|(_, b)| b).sum();
+            assert!(all > 1.0 && wrong < 0.01 * all, "{group}, {samples} samples: {wrong} of {all}");
+        }
+    }
+}
+
+/// Layers are as independent of threads and blocks as the picture is.
+#[test]
+fn threads_and_blocks_leave_no_trace() {
+    let scene = scene();
+    let mut settings = settings_at((70, 45));
+    settings.view.samples_per_pixel = 4;
+    let (image, layers, _) = rendered(&scene, &settings, all());
+    settings.view.block_samples = Some(4096);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (again, same, _) = pool.install(|| rendered(&scene, &settings, all()));
+    // Infinite depths are equal too.
+    assert_eq!((again, same), (image, layers));
 }
 
 /// A floor one unit below the eye, which looks straight down: depth, position, normal and albedo are known everywhere; beyond the floor's edge

@@ -274,7 +274,7 @@ fn ids_of(names: &Names, first: &FirstHits) -> Vec<Vec<f32>> {
     for id in &first.ids {
         by_pixel[id.pixel as usize].push((number_of(names, id), id.samples));
     }
-    let mut channels = vec![Vec::with_capacity(by_pixel.len()); 2 * RANKS];
+    let mut channels = vec![Vec::new(); 2 * RANKS];
     for (found, hit) in by_pixel.into_iter().zip(&first.pixels) {
         let ranks = ranked(names, found.into_iter(), hit.samples);
         channels.iter_mut().zip(ranks).for_each(|(channel, value)| channel.push(value));
