@@ -10,7 +10,7 @@ use super::layers;
 use super::partial::PartialPictures;
 use super::progress::Reporter;
 use super::ready::ReadyScene;
-use super::render::RenderArgs;
+use super::render_args::RenderArgs;
 use super::resume::{ResumableTiles, Resumed};
 use super::sinks::Sinks;
 use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};

@@ -31,6 +31,7 @@ mod progress;
 mod ready;
 mod region;
 mod render;
+mod render_args;
 mod resume;
 mod shared;
 mod sinks;
@@ -61,7 +62,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene file to an image.
-    Render(Box<render::RenderArgs>),
+    Render(Box<render_args::RenderArgs>),
     /// Evaluate a scene's light mesh and keep it in a file, for any number of renders.
     Bake(Box<bake::BakeArgs>),
     /// Put parts of an image together that `render --tile` or `--crop` wrote.

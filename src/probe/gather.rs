@@ -7,8 +7,8 @@ use glam::Vec3;
 use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
-use super::measure::Station;
 use super::sensor::Values;
+use super::station::Station;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::MeshError;
 use crate::light_mesh::direct_light::{Candidate, DirectLight, of_square};

@@ -10,6 +10,7 @@ use super::gather::Gather;
 use super::harmonics::COEFFICIENTS;
 use super::probes::Probe;
 use super::sensor::{Sensor, Values};
+use super::station::Station;
 use crate::render::{RenderError, Session};
 use crate::scene::Scene;
 use crate::settings::Settings;
@@ -30,30 +31,6 @@ impl ProbeSettings {
 impl Default for ProbeSettings {
     fn default() -> Self {
         Self { directions: 1024 }
-    }
-}
-
-/// A probe that is about to measure.
-pub struct Station {
-    /// Where it is.
-    pub position: Vec3,
-    /// Where its rays start.
-    pub origin: Vec3,
-    /// What it measures.
-    pub sensor: Sensor,
-}
-
-impl Station {
-    /// A probe with a normal may lie on a surface: its rays start in front of that, as those of surface points do.
-    fn new(position: Vec3, sensor: Sensor, scene_size: f32) -> Self {
-        let origin = match sensor {
-            Sensor::Plane(normal) => {
-                let size = position.abs().max_element() + scene_size;
-                position + normal * (32.0 * f32::EPSILON * size)
-            }
-            Sensor::Sphere | Sensor::Harmonics => position,
-        };
-        Self { position, origin, sensor }
     }
 }
 

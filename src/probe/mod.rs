@@ -20,6 +20,7 @@ mod map;
 mod measure;
 mod probes;
 mod sensor;
+mod station;
 mod table;
 
 pub use grid_file::{GridFile, encode_grid_bytes, encode_grid_json, encode_grid_vti};

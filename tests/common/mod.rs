@@ -11,6 +11,7 @@ use std::io::Write as _;
 use std::sync::Arc;
 
 use glam::Vec3;
+use lightmesh::World;
 use lightmesh::accel::{Backend, BackendChoice, BvhAccel};
 use lightmesh::image::Image;
 use lightmesh::light_mesh::direct::DirectMesh;
@@ -25,7 +26,6 @@ use lightmesh::scene::{
     TriangleMesh,
 };
 use lightmesh::settings::{Integrator, Settings};
-use lightmesh::World;
 
 /// Triangles by hand, with a material each.
 #[derive(Default)]

@@ -12,7 +12,8 @@ use self::list::read;
 use self::page::{Entry, Picture, html, markdown};
 use super::error::{CommandError, Outcome};
 use super::overrides::Overrides;
-use super::render::{RenderArgs, run as render};
+use super::render::run as render;
+use super::render_args::RenderArgs;
 use super::shared::{BackendArgs, QuietArgs, SceneArgs};
 use crate::image::OutputFile;
 

@@ -13,7 +13,7 @@ pub enum MeshFileError {
     #[error("is no file of light meshes")]
     Foreign,
     /// Another version of the format.
-    #[error("has version {found} of the format, only {} is known", super::sections::VERSION)]
+    #[error("has version {found} of the format, which this program does not know")]
     Version {
         /// The version.
         found: u32,

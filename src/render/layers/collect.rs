@@ -5,9 +5,9 @@ use std::hash::{DefaultHasher, Hasher as _};
 use std::sync::{Mutex, PoisonError};
 
 use super::LayerChoice;
+use super::layer_image::LayerImage;
 use super::record::LayerRecord;
 use crate::image::Image;
-use crate::image::exr::Window;
 use crate::lights::PackedLights;
 use crate::scene::Scene;
 
@@ -19,28 +19,6 @@ pub struct LayerCollector {
     choice: LayerChoice,
     /// The layers of the last pictures, with what tells these apart.
     kept: Mutex<VecDeque<(u64, LayerImage)>>,
-}
-
-/// The layers of a picture, beside the picture itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LayerImage {
-    /// The pixels that were rendered, counted from the top left of the whole picture.
-    pub window: Window,
-    /// The channels of all layers.
-    pub channels: Vec<LayerChannel>,
-    /// Names and values that go with the channels, such as the names of ids.
-    pub attributes: Vec<(String, String)>,
-}
-
-/// One channel of a layer.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LayerChannel {
-    /// Its name, with the layer's before a dot.
-    pub name: String,
-    /// Whether half precision is too little for it.
-    pub needs_float: bool,
-    /// Values, row by row from the top left of the window.
-    pub values: Vec<f32>,
 }
 
 impl LayerCollector {

@@ -7,11 +7,13 @@
 mod collect;
 mod cryptomatte;
 mod first_hits;
+mod layer_image;
 mod parts;
 mod record;
 
-pub use collect::{LayerChannel, LayerCollector, LayerImage};
+pub use collect::LayerCollector;
 pub use first_hits::FirstHits;
+pub use layer_image::{LayerChannel, LayerImage};
 pub use parts::LightParts;
 
 pub(in crate::render) use parts::GroupLight;

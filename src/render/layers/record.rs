@@ -5,9 +5,9 @@ use std::sync::{Mutex, PoisonError};
 
 use glam::Vec3;
 
-use super::collect::{LayerChannel, LayerImage};
 use super::cryptomatte::{IdKind, Names, RANKS, ranked};
 use super::first_hits::{FirstHits, IdSamples};
+use super::layer_image::{LayerChannel, LayerImage};
 use super::parts::LightParts;
 use super::{Layer, LayerChoice};
 use crate::image::exr::Window;
