@@ -107,7 +107,7 @@ const LEAST_SHARE: f32 = 1.0 / 96.0;
 /// Finds out what part of the lights at edges of shadows the vertices of a tile see, and corrects their light, which is to be
 /// multiplied by `scale`, and with it that of `groups`, which is not. Returns the number of rays.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+#[allow(clippy::too_many_arguments, reason = "what shading has to know is no thing of its own")]
 pub(super) fn smooth_shadow_edges<A: Accel>(
     accel: &A,
     lights: &PackedLights,
