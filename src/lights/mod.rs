@@ -17,7 +17,7 @@ pub(crate) use groups::PackedGroups;
 pub use packed::PackedLights;
 pub(crate) use packed::{IncidentLights, SurfaceLanes};
 pub(crate) use shape::lamp_numbers;
-pub(crate) use visibility::{SeenLights, VisibilityBits, expand_bits};
+pub(crate) use visibility::{HalfSeenLights, SeenLights, VisibilityBits, expand_bits};
 // For tests and benches only.
 #[doc(hidden)]
 pub use visibility::{Unoccluded, Visibility};

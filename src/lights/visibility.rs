@@ -43,3 +43,24 @@ impl Visibility for SeenLights<'_> {
         (bits != 0).then(|| expand_bits(bits))
     }
 }
+
+/// The lights whose bits are set are seen or half seen, by chunk; `half` may be empty.
+pub(crate) struct HalfSeenLights<'a> {
+    pub seen: &'a [VisibilityBits],
+    pub half: &'a [VisibilityBits],
+}
+
+impl Visibility for HalfSeenLights<'_> {
+    #[inline(always)]
+    fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
+        let (seen, half) = (self.seen[index], self.half.get(index).copied().unwrap_or(0));
+        if seen | half == 0 {
+            return None;
+        }
+        let mut visible = expand_bits(seen);
+        for (lane, visible) in visible.iter_mut().enumerate() {
+            *visible = if half >> lane & 1 == 1 { 0.5 } else { *visible };
+        }
+        Some(visible)
+    }
+}

@@ -10,8 +10,8 @@ use super::layers::GroupLight;
 use super::paths::{PathVertex, TilePaths};
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, LaneMask, RayPacket};
-use crate::lights::{PackedLights, Visibility, VisibilityBits, expand_bits};
-use crate::simd::{LANES, Lanes};
+use crate::lights::{HalfSeenLights, PackedLights, VisibilityBits};
+use crate::simd::LANES;
 
 /// Which lights the vertices of a tile see.
 pub(super) struct TileVisibility {
@@ -59,7 +59,7 @@ impl TileVisibility {
     pub fn add_by_group(&self, lights: &PackedLights, vertices: &[PathVertex], groups: &mut GroupLight) {
         for (number, vertex) in vertices.iter().enumerate() {
             let settled = self.settled.get(number * self.chunks..).unwrap_or_default();
-            groups.add(lights, number, vertex, SeenAndSettled { seen: self.seen(number), settled });
+            groups.add(lights, number, vertex, HalfSeenLights { seen: self.seen(number), half: settled });
         }
     }
 
@@ -69,27 +69,6 @@ impl TileVisibility {
         for vertex in vertices {
             self.settled[vertex * self.chunks + index] |= lights;
         }
-    }
-}
-
-/// The lights that a vertex sees, and those that are settled there, if there are any, by chunk.
-struct SeenAndSettled<'a> {
-    seen: &'a [VisibilityBits],
-    settled: &'a [VisibilityBits],
-}
-
-impl Visibility for SeenAndSettled<'_> {
-    #[inline(always)]
-    fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
-        let (seen, settled) = (self.seen[index], self.settled.get(index).copied().unwrap_or(0));
-        if seen | settled == 0 {
-            return None;
-        }
-        let mut visible = expand_bits(seen);
-        for (lane, visible) in visible.iter_mut().enumerate() {
-            *visible = if settled >> lane & 1 == 1 { 0.5 } else { *visible };
-        }
-        Some(visible)
     }
 }
 
@@ -107,7 +86,7 @@ const LEAST_SHARE: f32 = 1.0 / 96.0;
 /// Finds out what part of the lights at edges of shadows the vertices of a tile see, and corrects their light, which is to be
 /// multiplied by `scale`, and with it that of `groups`, which is not. Returns the number of rays.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+#[allow(clippy::too_many_arguments, reason = "what shading has to know is no thing of its own")]
 pub(super) fn smooth_shadow_edges<A: Accel>(
     accel: &A,
     lights: &PackedLights,

@@ -28,7 +28,7 @@ use prior::Prior;
 use trace::LightTracer;
 
 /// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light, and `groups` with its parts.
-#[allow(clippy::too_many_arguments)]
+#[allow(clippy::too_many_arguments, reason = "what shading has to know is no thing of its own")]
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
     accel: &A,
