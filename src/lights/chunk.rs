@@ -91,6 +91,18 @@ impl LightChunk {
         self.shapes.as_ref().map(|shapes| &shapes[lane]).filter(|shape| !matches!(shape, LampShape::Point))
     }
 
+    /// Of a cluster of emissive triangles, the square of the radius of a disc of its size; `None` of all other lights.
+    pub fn emitter_size(&self, lane: usize) -> Option<f32> {
+        self.kinds.as_ref()?.emitter_size(lane)
+    }
+
+    /// What a point of a flat cluster of emissive triangles sends along the way to it, over the cluster's intensity: the cosine there over the squared
+    /// distance.
+    #[inline(always)]
+    pub fn emitted_along(&self, lane: usize, way: [f32; 3]) -> f32 {
+        self.kinds.as_ref().map_or(0.0, |kinds| kinds.emitted_along(lane, way))
+    }
+
     /// Whether rays of neighbours towards a light stay together: those to a lamp with a size go to different points of it, and take a tenth longer as
     /// one packet.
     #[inline(always)]

@@ -64,6 +64,21 @@ impl KindLanes {
         if size >= 0.0 { share * disc(share, size) } else { share * share }
     }
 
+    /// [`Emitter::radius_squared`] of an emitter.
+    pub fn emitter_size(&self, lane: usize) -> Option<f32> {
+        Some(self.radius_squared[lane]).filter(|&size| size >= 0.0)
+    }
+
+    /// The cosine at a flat emitter, over the squared distance, for a point of it that a way leads to.
+    #[inline(always)]
+    pub fn emitted_along(&self, lane: usize, way: [f32; 3]) -> f32 {
+        let [x, y, z] = way;
+        let distance = (x * x + y * y + z * z).sqrt();
+        let along = self.axis[0][lane] * x + self.axis[1][lane] * y + self.axis[2][lane] * z;
+        // Over the distance once for the cosine; the law brings the square.
+        if distance > 0.0 { (-along).max(0.0) * InverseSquareFalloff.over_distance(distance) } else { 0.0 }
+    }
+
     /// φ1 of directional lights is 1: 1/(t·φ1(t)) is 1/t. That of emitters is t².
     #[inline(always)]
     pub fn over_distance(&self, lane: usize, falloff: impl FalloffLaw, distance: f32) -> f32 {

@@ -73,7 +73,14 @@ fn a_plane_under_a_lamp_follows_the_inverse_square_of_the_distance() {
 /// from below its middle (the configuration factor of a disc).
 #[test]
 fn a_plane_under_a_disc_follows_its_configuration_factor() {
-    let (at, radius, intensity) = (Vec3::new(0.2, 1.5, 0.1), 0.5f32, 4.0);
+    // At three times its radius above the plane, and at half of it.
+    for height in [1.5, 0.25] {
+        disc_at(Vec3::new(0.2, height, 0.1));
+    }
+}
+
+fn disc_at(at: Vec3) {
+    let (radius, intensity) = (0.5f32, 4.0);
     let mut scene = free(Vec::new());
     scene.add_disc(at, Vec3::NEG_Y, radius, Vec3::splat(intensity));
     let probes = desk().probes();
