@@ -102,15 +102,18 @@ fn with_layers(image: &Image, layers: &LayerImage, options: &ImageOptions) -> Op
     let window = options.window.unwrap_or(Window::whole(display));
     let cropped = image.crop(window)?;
     let mut file = ChannelImage::new(display, window.try_into().ok()?);
+    // Layers have the tiles that the part lies in.
+    let from = |start: i32, of_layers: i32| usize::try_from(start.checked_sub(of_layers)?).ok();
+    let (left, top) = (from(file.window.x, layers.window.x)?, from(file.window.y, layers.window.y)?);
     for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
         let values = cropped.pixels().iter().map(|pixel| pixel[index]);
         file.channels.push(Channel::new(name, Samples::of(options.sample_type, values)));
     }
     for layer in &layers.channels {
         let sample_type = if layer.needs_float { SampleType::Float } else { options.sample_type };
-        let rows = layer.values.chunks(display.0 as usize);
-        let shown = rows.skip(window.y as usize).take(window.height as usize);
-        let columns = window.x as usize..window.end().0 as usize;
+        let rows = layer.values.chunks(layers.window.width as usize);
+        let shown = rows.skip(top).take(window.height as usize);
+        let columns = left..left + window.width as usize;
         let values = shown.flat_map(|row| row.get(columns.clone()).unwrap_or_default()).copied();
         file.channels.push(Channel::new(&layer.name, Samples::of(sample_type, values)));
     }
