@@ -45,6 +45,15 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
                 "lightmesh render scene.toml -o truth.exr --integrator conventional",
                 "what the light mesh is to be compared with",
             ),
+            example(
+                "lightmesh render scene.toml --light-mesh field.lmesh --update -o picture.png",
+                "by a light mesh that is kept from render to render",
+            ),
+            example("lightmesh render scene.toml --tile 1/2 -o t1.exr", "the first half of a picture"),
+            example(
+                "lightmesh render scene.toml --tile 2/2 -o t2.exr",
+                "the second, on another machine perhaps",
+            ),
         ],
     ),
     (
@@ -52,17 +61,9 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
         &[
             example("lightmesh bake scene.toml -o field.lmesh", "what the scene's cameras see"),
             example("lightmesh bake scene.toml -o box.lmesh --box 0,0,0 1,1,1", "all mesh points in a box"),
-            example("lightmesh render scene.toml --light-mesh field.lmesh -o picture.png", "a picture by it"),
         ],
     ),
-    (
-        &["merge"],
-        &[
-            example("lightmesh render scene.toml --tile 1/2 -o t1.exr", "one half of a picture"),
-            example("lightmesh render scene.toml --tile 2/2 -o t2.exr", "the other"),
-            example("lightmesh merge t1.exr t2.exr -o whole.exr", "the whole"),
-        ],
-    ),
+    (&["merge"], &[example("lightmesh merge t1.exr t2.exr -o whole.exr", "two halves to the whole")]),
     (
         &["probe"],
         &[

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use crate::image::{ImageError, OutputFile};
+use crate::image::{Image, ImageError, OutputFile};
 use crate::light_mesh::file::{MeshFile, MeshFileError, SectionsWriter};
 use crate::render::{Tile, TileSink};
 use crate::scene::Fingerprint;
@@ -17,30 +17,36 @@ use crate::settings::Settings;
 const RENDER: &str = "render";
 const TILES: &str = "tiles";
 
-/// A tile of a picture that settings made which leave nothing open: where it lies, and its pixels.
-#[derive(Serialize, Deserialize)]
+/// A tile: where it lies, and its pixels.
+#[derive(Clone, Serialize, Deserialize)]
 struct SavedTile {
-    picture: Fingerprint,
-    x: u32,
-    y: u32,
+    place: (u32, u32),
     pixels: Vec<[f32; 3]>,
 }
 
-type Place = (Fingerprint, u32, u32);
-
-/// The tiles of a render, whatever picture they are of.
+/// The tiles of the picture that a render was interrupted at. A render makes several, if the first one is not good enough.
 pub struct ResumableTiles {
     /// What is rendered: scene, camera, settings.
     render: Fingerprint,
-    known: HashMap<Place, Vec<[f32; 3]>>,
+    known: Known,
     done: Mutex<Done>,
+}
+
+/// Tiles of a picture that settings made which leave nothing open.
+#[derive(Default)]
+struct Known {
+    picture: Option<Fingerprint>,
+    tiles: HashMap<(u32, u32), Vec<[f32; 3]>>,
 }
 
 #[derive(Default)]
 struct Done {
     /// The picture that is made.
     picture: Option<Fingerprint>,
-    tiles: HashMap<Place, Vec<[f32; 3]>>,
+    /// Those that are finished, without their pixels: to copy these would cost a tenth of shading.
+    finished: Vec<Tile>,
+    /// With their pixels, once the render is stopped.
+    tiles: Vec<SavedTile>,
 }
 
 /// What came of a file of tiles.
@@ -57,7 +63,7 @@ pub enum Resumed {
 impl ResumableTiles {
     /// With no tile known.
     pub fn new(render: Fingerprint) -> Self {
-        Self { render, known: HashMap::new(), done: Mutex::default() }
+        Self { render, known: Known::default(), done: Mutex::default() }
     }
 
     /// Where the tiles of an image are kept.
@@ -80,32 +86,36 @@ impl ResumableTiles {
         if file.value::<Fingerprint>(RENDER)? != self.render {
             return Ok(Resumed::Other);
         }
-        let tiles: Vec<SavedTile> = file.value(TILES)?;
-        self.known = tiles.into_iter().map(|tile| ((tile.picture, tile.x, tile.y), tile.pixels)).collect();
-        Ok(Resumed::Tiles(self.known.len()))
+        let (picture, tiles): (Option<Fingerprint>, Vec<SavedTile>) = file.value(TILES)?;
+        let tiles = tiles.into_iter().map(|tile| (tile.place, tile.pixels)).collect();
+        self.known = Known { picture, tiles };
+        Ok(Resumed::Tiles(self.known.tiles.len()))
     }
 
-    /// Writes the tiles that are done, and those that were known before; returns their number.
+    /// Writes the tiles that are done, or those that were known if there are none yet; returns their number.
     ///
     /// # Errors
     /// If the file can't be written; then it is as it was.
     pub fn write(&self, path: &Path) -> Result<usize, ImageError> {
-        let done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        let all = self.known.iter().filter(|(place, _)| !done.tiles.contains_key(place)).chain(&done.tiles);
-        let saved = |(&(picture, x, y), pixels): (&Place, &Vec<[f32; 3]>)| SavedTile {
-            picture,
-            x,
-            y,
-            pixels: pixels.clone(),
+        let done = self.done();
+        let (picture, tiles) = if done.tiles.is_empty() {
+            let known = self.known.tiles.iter();
+            let tiles = known.map(|(&place, pixels)| SavedTile { place, pixels: pixels.clone() });
+            (self.known.picture, tiles.collect())
+        } else {
+            (done.picture, done.tiles.clone())
         };
-        let tiles: Vec<SavedTile> = all.map(saved).collect();
         let mut writer = SectionsWriter::default();
         let refuse =
             |error: MeshFileError| ImageError::Write { path: path.to_path_buf(), cause: error.to_string() };
         writer.value(RENDER, &self.render).map_err(refuse)?;
-        writer.value(TILES, &tiles).map_err(refuse)?;
+        writer.value(TILES, &(picture, &tiles)).map_err(refuse)?;
         OutputFile::new(path)?.write(&writer.finish())?;
         Ok(tiles.len())
+    }
+
+    fn done(&self) -> MutexGuard<'_, Done> {
+        self.done.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -114,19 +124,22 @@ impl TileSink for ResumableTiles {
         let mut settings = settings.clone();
         // Whichever part is rendered, and however it is cut up, the pixels are the same.
         (settings.view.crop, settings.view.block_samples) = (None, None);
-        let picture = Some(Fingerprint::of(&settings));
-        self.done.lock().unwrap_or_else(PoisonError::into_inner).picture = picture;
+        *self.done() = Done { picture: Some(Fingerprint::of(&settings)), ..Done::default() };
     }
 
-    fn tile(&self, tile: &Tile, pixels: &[[f32; 3]]) {
-        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(picture) = done.picture {
-            done.tiles.insert((picture, tile.x, tile.y), pixels.to_vec());
-        }
+    fn tile(&self, tile: &Tile, _: &[[f32; 3]]) {
+        self.done().finished.push(*tile);
     }
 
     fn known(&self, tile: &Tile) -> Option<Vec<[f32; 3]>> {
-        let picture = self.done.lock().unwrap_or_else(PoisonError::into_inner).picture?;
-        self.known.get(&(picture, tile.x, tile.y)).cloned()
+        let is_known = self.known.picture.is_some() && self.done().picture == self.known.picture;
+        self.known.tiles.get(&(tile.x, tile.y)).filter(|_| is_known).cloned()
+    }
+
+    fn interrupted(&self, image: &Image) {
+        let mut done = self.done();
+        let pixels = |tile: &Tile| image.crop(tile.window()).map(|crop| crop.pixels().to_vec());
+        let saved = |tile: &Tile| Some(SavedTile { place: (tile.x, tile.y), pixels: pixels(tile)? });
+        done.tiles = done.finished.iter().filter_map(saved).collect();
     }
 }

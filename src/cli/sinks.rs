@@ -20,6 +20,10 @@ impl TileSink for Sinks<'_> {
         self.0.iter().find_map(|sink| sink.known(tile))
     }
 
+    fn interrupted(&self, image: &Image) {
+        self.0.iter().for_each(|sink| sink.interrupted(image));
+    }
+
     fn picture(&self, image: &Image) {
         self.0.iter().for_each(|sink| sink.picture(image));
     }

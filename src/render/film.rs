@@ -22,6 +22,9 @@ pub trait TileSink: Sync {
         None
     }
 
+    /// The render is stopped: the picture as far as its tiles are finished.
+    fn interrupted(&self, _: &Image) {}
+
     /// A whole picture is finished; if there are steps to come, tiles of better ones follow.
     fn picture(&self, _: &Image) {}
 }

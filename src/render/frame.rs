@@ -196,8 +196,25 @@ impl<'a, A: Accel> Frame<'a, A> {
         let (width, height) = self.view.resolution;
         let mut image = Image::new(width, height)?;
         self.leave_out(&mut image);
-        let mut kept = std::mem::take(&mut self.kept).into_iter();
+        let kept = std::mem::take(&mut self.kept);
         let record = self.layers.map(|layers| layers.begin(self.world.scene, self.world.lights));
+        let finished = self.run_blocks(integrator, kept, record.as_ref(), &mut image, stats);
+        finished.inspect_err(|_| self.sink.interrupted(&image))?;
+        if let Some((layers, record)) = self.layers.zip(record) {
+            layers.end(&image, record);
+        }
+        Ok(image)
+    }
+
+    fn run_blocks(
+        &self,
+        integrator: &mut impl BlockIntegrator,
+        kept: Vec<Vec<TilePaths>>,
+        record: Option<&LayerRecord>,
+        image: &mut Image,
+        stats: &mut RenderStats,
+    ) -> Result<(), RenderError> {
+        let mut kept = kept.into_iter();
         // Kept from block to block: the first use of memory costs a sixth of the camera paths.
         let mut paths: Vec<TilePaths> = Vec::new();
         for block in &self.blocks {
@@ -212,18 +229,15 @@ impl<'a, A: Accel> Frame<'a, A> {
             }
             let mut shade = stats.seconds.shade;
             let counters = timed(&mut shade, || {
-                let counters = self.shade(integrator, block, &mut paths, record.as_ref());
-                resolve_block(block, &paths, self.summed_samples(), &mut image);
+                let counters = self.shade(integrator, block, &mut paths, record);
+                resolve_block(block, &paths, self.summed_samples(), image);
                 counters
             });
             stats.seconds.shade = shade;
             counters.into_iter().for_each(|counters| stats.add_shading(counters));
             self.stop.check()?;
         }
-        if let Some((layers, record)) = self.layers.zip(record) {
-            layers.end(&image, record);
-        }
-        Ok(image)
+        Ok(())
     }
 
     /// Leaves out the tiles that nobody asked for, and those whose pixels are known, which are put into the image.

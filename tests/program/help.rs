@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 
 const MODEL: &str = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
 
-const SCENE: &str = "[camera]\nname = \"front\"\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[render]\nresolution = [8, 8]\n\
+const SCENE: &str = "[camera]\nname = \"front\"\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[render]\nresolution = [64, 8]\n\
                      [[geometry]]\nfile = \"model.obj\"\n[[light]]\nposition = [0, 1, 2]\nintensity = 1\n";
 
 const LIST: &str = "[[picture]]\nname = \"first\"\ntitle = \"T\"\nscene = \"scene.toml\"\ncaption = \"C\"\n";
