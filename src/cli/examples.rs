@@ -87,13 +87,10 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
     ),
     (
         &["export"],
-        &[
-            example("lightmesh bake scene.toml -o field.lmesh", "mesh points"),
-            example(
-                "lightmesh export field.lmesh -o field.vtu -o field.ply",
-                "the same for ParaView and others",
-            ),
-        ],
+        &[example(
+            "lightmesh export field.lmesh -o field.vtu -o field.ply",
+            "baked mesh points, for ParaView and others",
+        )],
     ),
     (
         &["info"],

@@ -79,6 +79,16 @@ fn helps() -> Vec<(Vec<String>, String)> {
 #[test]
 fn examples_run_as_they_are_printed() {
     let folder = folder();
+    // What examples of other commands make.
+    let before = [
+        "bake scene.toml -o field.lmesh",
+        "render scene.toml --tile 1/2 -o t1.exr",
+        "render scene.toml --tile 2/2 -o t2.exr",
+    ];
+    for line in before {
+        let output = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{line}: {}", stderr(&output));
+    }
     let mut ran = 0;
     for (path, help) in helps() {
         let lines = help.lines().skip_while(|line| *line != "Examples:").map(str::trim);
