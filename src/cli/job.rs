@@ -10,6 +10,7 @@ use super::layers;
 use super::partial::PartialPictures;
 use super::progress::Reporter;
 use super::ready::ReadyScene;
+use super::region::RASTER;
 use super::render_args::RenderArgs;
 use super::resume::{ResumableTiles, Resumed};
 use super::sinks::Sinks;
@@ -17,7 +18,7 @@ use super::stats_file::{BackendStats, Seconds, StatsFile, peak_rss_bytes};
 use super::written::{Written, is_written};
 use crate::accel::Accel;
 use crate::image::output::{ImageOptions, OutputTarget};
-use crate::image::{Image, exr::SampleType, tone::auto_exposure};
+use crate::image::{Image, Window, exr::SampleType, tone::auto_exposure};
 use crate::render::{LayerCollector, LayerImage, RenderError, RenderStats, TileSink};
 use crate::scene::Camera;
 
@@ -48,6 +49,7 @@ impl Job<'_> {
             let names: Vec<String> =
                 targets.iter().map(|target| target.path().display().to_string()).collect();
             reporter.line(&format!("note: {}: finished, stays as it is", names.join(", ")));
+            reporter.bar("rendering").set(1, 1);
             return Ok(0);
         }
         let collector = args.layers.collector(&targets)?;
@@ -87,8 +89,11 @@ impl Job<'_> {
         let partial_targets = if args.write_partial { targets } else { &[] };
         let partial = PartialPictures::new(partial_targets, sample_type(args), settings.view.crop, exposure);
         let bar = reporter.bar("rendering");
-        let (width, height) = settings.view.resolution;
-        bar.set(0, u64::from(width) * u64::from(height));
+        let whole = Window::whole(settings.view.resolution);
+        // A part is rendered tile by tile.
+        let part = settings.view.crop.map_or(whole, |crop| crop.on_raster(RASTER, settings.view.resolution));
+        let pixels = u64::from(part.width) * u64::from(part.height);
+        bar.set(0, pixels);
         let server = args.display_server.as_deref();
         let display = LiveDisplay::new(server, &args.scene.path, settings.view.resolution, args.quiet);
         let sinks: Vec<&dyn TileSink> = vec![&bar, &partial, &tiles, &display];
@@ -97,6 +102,9 @@ impl Job<'_> {
         let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
         let rendered = session.render_layers(camera, settings, &Sinks(sinks), &interrupt.stop, layers);
         display.finish();
+        if rendered.is_ok() {
+            bar.set(pixels, pixels);
+        }
         bar.finish();
         if let (Err(RenderError::Stopped), Some(exit_code)) = (&rendered, interrupt.exit_code()) {
             args.light_mesh.update(session, settings)?;

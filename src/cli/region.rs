@@ -8,7 +8,7 @@ use super::error::CommandError;
 use crate::image::Window;
 
 /// Edge of the raster along which an image is cut into tiles, pixels.
-const RASTER: u32 = 32;
+pub const RASTER: u32 = 32;
 
 /// Part of the image to render.
 #[derive(Args, Clone, Copy, Debug, Default)]

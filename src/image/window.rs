@@ -43,6 +43,16 @@ impl Window {
         self.x < other_right && other.x < right && self.y < other_bottom && other.y < bottom
     }
 
+    /// The squares of a raster that it meets, within an image of the given width and height.
+    pub fn on_raster(&self, step: u32, (width, height): (u32, u32)) -> Self {
+        let down = |at: u32| at / step * step;
+        let (right, bottom) = self.end();
+        let (right, bottom) =
+            (right.next_multiple_of(step).min(width), bottom.next_multiple_of(step).min(height));
+        let (x, y) = (down(self.x), down(self.y));
+        Self { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) }
+    }
+
     /// The `number`-th (from 1) of `count` parts that an image of the given width and height is cut into, along a raster of squares of `step`
     /// pixels: columns and rows of parts as nearly square as such a number of parts can be. `None` if there is no such part, or the raster has too
     /// few squares.
@@ -122,6 +132,7 @@ mod tests {
         let window = Window { x: 1, y: 1, width: 2, height: 2 };
         let crop = image.crop(window).unwrap();
         assert_eq!(crop.pixels(), [[5.0; 3], [6.0; 3], [9.0; 3], [10.0; 3]]);
+        assert_eq!(window.on_raster(2, (4, 3)), Window { x: 0, y: 0, width: 4, height: 3 });
         assert!(image.crop(Window { x: 3, ..window }).is_none());
         assert!(image.crop(Window { width: 0, ..window }).is_none());
         assert!(image.crop(Window { x: u32::MAX, ..window }).is_none());
