@@ -78,7 +78,7 @@ impl Job<'_> {
         layers: Option<&LayerCollector>,
     ) -> Result<(Image, RenderStats), CommandError> {
         let Self { args, reporter, ref mut ready, .. } = *self;
-        let ReadyScene { session, settings, bare, .. } = ready;
+        let ReadyScene { session, settings, bare, animation, .. } = ready;
         let partial_file = targets.first().map(|target| ResumableTiles::path(target.path()));
         let mut tiles = ResumableTiles::new(written.render);
         if let Some(path) = partial_file.as_deref().filter(|_| args.resume) {
@@ -107,7 +107,9 @@ impl Job<'_> {
         }
         bar.finish();
         if let (Err(RenderError::Stopped), Some(exit_code)) = (&rendered, interrupt.exit_code()) {
-            args.light_mesh.update(session, settings)?;
+            if !(args.frames.frames.is_some() && animation.moves_scene()) {
+                args.light_mesh.update(session, settings)?;
+            }
             let kept = match &partial_file {
                 Some(path) => format!(
                     "{} tiles are kept in {}; the same command with --resume goes on",

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::error::CommandError;
 use super::progress::Reporter;
+use crate::image::OutputFile;
 use crate::light_mesh::file::MeshFileError;
 use crate::render::Session;
 use crate::settings::Settings;
@@ -22,6 +23,17 @@ pub struct LightMeshArgs {
 }
 
 impl LightMeshArgs {
+    /// Checks that the file can be written, if that will be asked for.
+    ///
+    /// # Errors
+    /// [`CommandError::Image`].
+    pub fn check(&self) -> Result<(), CommandError> {
+        if let Some(path) = self.light_mesh.as_deref().filter(|_| self.update) {
+            OutputFile::new(path)?;
+        }
+        Ok(())
+    }
+
     /// Gives the light mesh of the file to a session.
     ///
     /// # Errors

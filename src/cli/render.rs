@@ -18,6 +18,7 @@ pub fn run(args: &RenderArgs) -> Result<Outcome, CommandError> {
     // Before anything is loaded: what can't be written is an error at once.
     args.frames.targets(&args.output, args.frames.first())?;
     args.frames.file(args.stats.as_deref(), args.frames.first())?;
+    args.light_mesh.check()?;
     args.threads.pool()?.install(|| render_all(args))?;
     Ok(Outcome::Passed)
 }

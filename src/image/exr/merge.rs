@@ -1,5 +1,7 @@
 //! Putting parts of a picture together.
 
+use std::collections::BTreeMap;
+
 use super::{Channel, ChannelImage, Samples, Window};
 
 /// Why parts are no picture.
@@ -50,8 +52,16 @@ pub fn merge(parts: &[ChannelImage], identity: &[&str]) -> Result<ChannelImage, 
     }
     let (width, height) = first.display;
     let mut whole = ChannelImage::new(first.display, Window::of_display(first.display));
-    let in_all = |entry: &&(String, String)| parts.iter().all(|part| part.metadata.contains(entry));
-    whole.metadata = first.metadata.iter().filter(in_all).cloned().collect();
+    let in_all = |entry: &(String, String)| parts.iter().all(|part| part.metadata.contains(entry));
+    for entry in &first.metadata {
+        if in_all(entry) {
+            whole.metadata.push(entry.clone());
+        } else if is_manifest(&entry.0)
+            && let Some(manifest) = merged_manifest(parts, &entry.0)
+        {
+            whole.metadata.push((entry.0.clone(), manifest));
+        }
+    }
     let pixels = whole.window.pixels() as usize;
     whole.channels = first
         .channels
@@ -97,6 +107,21 @@ pub fn merge(parts: &[ChannelImage], identity: &[&str]) -> Result<ChannelImage, 
             y: place as u32 / width,
         }),
     }
+}
+
+/// Whether an attribute lists the names of Cryptomatte's ids: each part lists those that it shows.
+fn is_manifest(key: &str) -> bool {
+    key.starts_with("cryptomatte/") && key.ends_with("/manifest")
+}
+
+/// The names of all parts; `None` if one has no list.
+fn merged_manifest(parts: &[ChannelImage], key: &str) -> Option<String> {
+    let mut names = BTreeMap::<String, String>::new();
+    for part in parts {
+        let (_, manifest) = part.metadata.iter().find(|(name, _)| name == key)?;
+        names.extend(serde_json::from_str::<BTreeMap<String, String>>(manifest).ok()?);
+    }
+    serde_json::to_string(&names).ok()
 }
 
 /// In what two parts are not of one picture.
@@ -171,6 +196,20 @@ mod tests {
         assert_eq!(whole.channels, [Channel::new("Z", Samples::Float(vec![0.0, 1.0, 2.0, 3.0]))]);
         assert_eq!(whole.metadata, [("scene".to_owned(), "a".to_owned())]);
         assert_eq!(whole.window, Window::of_display((4, 1)));
+    }
+
+    /// Each part of a Cryptomatte layer names what it shows; the whole names all.
+    #[test]
+    fn names_of_ids_are_put_together() {
+        let with = |mut image: ChannelImage, manifest: &str| {
+            image.metadata.push(("cryptomatte/0123abc/manifest".into(), manifest.into()));
+            image
+        };
+        let left = with(part(0, 2, 0.0), r#"{"floor":"11"}"#);
+        let right = with(part(2, 2, 0.0), r#"{"wall":"22","floor":"11"}"#);
+        let whole = merge(&[left, right], &[]).unwrap();
+        let manifest = whole.metadata.iter().find(|(key, _)| key.ends_with("manifest")).unwrap();
+        assert_eq!(manifest.1, r#"{"floor":"11","wall":"22"}"#);
     }
 
     /// What does not belong together is not put together.
