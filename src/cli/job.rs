@@ -44,7 +44,7 @@ impl Job<'_> {
         let Self { args, reporter, .. } = *self;
         let targets = args.frames.targets(&args.output, number)?;
         let stats_target = args.frames.file(args.stats.as_deref(), number)?;
-        let written = Written::of(&args.scene.path, &self.ready.session, camera, &self.ready.settings);
+        let written = Written::of(args, &self.ready.session, camera, &self.ready.settings);
         if args.resume && targets.iter().all(|target| is_written(target.path(), &written)) {
             let names: Vec<String> =
                 targets.iter().map(|target| target.path().display().to_string()).collect();

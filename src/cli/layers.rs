@@ -1,5 +1,6 @@
 //! `--aov` and `--light-groups` of `lightmesh render`: layers of the image, in its EXR files.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -53,6 +54,14 @@ impl FromStr for LayerList {
             }
         });
         Ok(Self(layers))
+    }
+}
+
+/// The names of the layers, each after a comma.
+impl fmt::Display for LayerArgs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.aov.0.iter().try_for_each(|layer| write!(f, ",{layer}"))?;
+        f.write_str(if self.light_groups { ",light-groups" } else { "" })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::render_args::RenderArgs;
 use crate::accel::Backend;
 use crate::image::metadata;
 use crate::render::{RenderStats, Session};
@@ -11,6 +12,7 @@ use crate::settings::{OutputSettings, Settings};
 /// Names of attributes.
 const RENDER: &str = "lightmesh:render";
 const PART: &str = "lightmesh:part";
+const FORM: &str = "lightmesh:form";
 
 /// How an image is made.
 #[derive(Clone, Debug)]
@@ -24,11 +26,13 @@ pub struct Written {
     pub render: Fingerprint,
     /// Which part of it is rendered.
     part: String,
+    /// Its layers, and how precise they are.
+    form: String,
 }
 
 impl Written {
     /// By a session, of a view.
-    pub fn of(file: &Path, session: &Session, camera: &Camera, settings: &Settings) -> Self {
+    pub fn of(args: &RenderArgs, session: &Session, camera: &Camera, settings: &Settings) -> Self {
         let backend: &Backend = session.backend();
         let scene = SceneFingerprint::of(session.scene());
         // The same for all parts of an image, and however it is written.
@@ -44,7 +48,7 @@ impl Written {
             }
         };
         // The name alone: where the scene lies is a matter of the machine.
-        let scene_name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let scene_name = args.scene.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Self {
             backend: backend.to_string(),
             scene_name,
@@ -52,6 +56,7 @@ impl Written {
             settings: format!("{of_whole:?}"),
             render,
             part,
+            form: format!("{}{}", if args.float { "float" } else { "half" }, args.layers),
         }
     }
 
@@ -66,6 +71,7 @@ impl Written {
             entry("lightmesh:settings", self.settings.clone()),
             entry(RENDER, self.render.to_string()),
             entry(PART, self.part.clone()),
+            entry(FORM, self.form.clone()),
             entry("lightmesh:exposure", exposure.to_string()),
         ];
         if let Some(found) = stats.accuracy.and_then(|accuracy| accuracy.found) {
@@ -79,5 +85,5 @@ impl Written {
 pub fn is_written(path: &Path, written: &Written) -> bool {
     let found = metadata(path);
     let has = |key: &str, value: &str| found.iter().any(|(name, own)| name == key && own == value);
-    has(RENDER, &written.render.to_string()) && has(PART, &written.part)
+    has(RENDER, &written.render.to_string()) && has(PART, &written.part) && has(FORM, &written.form)
 }
