@@ -15,7 +15,7 @@
 //!
 //! | room | what |
 //! |---|---|
-//! | [`file`] | files of sections that are mapped |
+//! | [`mod@file`] | files of sections that are mapped |
 //! | `points` | positions and ids, kernels, finding the points of D_y |
 //! | `leaks` | which points of D_y count for a surface point |
 //! | `store` | which points are known, and in which slot |
