@@ -53,7 +53,7 @@ folder=$(realpath -- "$2")
 submit() {
     sbatch --parsable --kill-on-invalid-dep=yes "$@"
 }
-bake=$(submit --output="$folder/logs/bake.%j.log" "$here/bake.sh" "$scene" "$folder")
+bake=$(submit --output="$folder/logs/bake.%j.log" "$here/bake.sh" "$scene" "$folder" $frames)
 # One task per tile of each frame, tiles first: task T renders tile T % TILES + 1 of frame FIRST + T / TILES.
 render=$(submit --dependency="afterok:$bake" --array="0-$((count * tiles - 1))" --requeue --open-mode=append \
     --output="$folder/logs/tile.%A_%a.log" "$here/tile.sh" "$scene" "$folder" "$tiles" "$first")

@@ -88,7 +88,9 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
         None => seen.into_iter().map(|(_, camera)| camera.clone()).collect(),
         Some(numbers) => {
             if animation.moves_scene() {
-                return Err(CommandError::MovingBake { scene: args.scene.path.clone() });
+                reporter.line(
+                    "note: only cameras move here; frames evaluate anew what other motion may have changed",
+                );
             }
             let views = numbers.into_iter().flat_map(|number| {
                 let frame = animation.frame(number);

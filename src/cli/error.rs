@@ -116,12 +116,6 @@ pub enum CommandError {
         /// Why.
         source: MergeError,
     },
-    /// Triangles or lights move, so that frames have no light mesh in common.
-    #[error("{}: more than cameras moves in these frames, which then have no light mesh in common: `render --frames` keeps what it can", scene.display())]
-    MovingBake {
-        /// The scene file.
-        scene: PathBuf,
-    },
     /// A light mesh can't be used.
     #[error("{}", file.display())]
     LightMesh {

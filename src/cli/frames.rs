@@ -30,7 +30,7 @@ pub enum Frames {
     Numbers(Vec<i64>),
 }
 
-/// Reads frames: numbers and ranges a-b or a-bxstep, separated by commas.
+/// Reads frames: numbers and ranges a-b or a-bxstep, as Open Job Description has it a-b:step, separated by commas.
 pub fn frames(text: &str) -> Result<Frames, String> {
     if text == "all" {
         return Ok(Frames::All);
@@ -65,7 +65,7 @@ fn range(part: &str) -> Option<(i64, i64, i64)> {
     // A minus may stand in front of either number.
     let dash = part.char_indices().skip(1).find(|(_, letter)| *letter == '-')?.0;
     let (first, rest) = (part.get(..dash)?, part.get(dash + 1..)?);
-    let (last, step) = rest.split_once('x').unwrap_or((rest, "1"));
+    let (last, step) = rest.split_once(['x', ':']).unwrap_or((rest, "1"));
     Some((number(first)?, number(last)?, number(step).filter(|&step| step > 0)?))
 }
 
@@ -250,6 +250,7 @@ mod tests {
         assert_eq!(numbers("7"), [7]);
         assert_eq!(numbers("1-4"), [1, 2, 3, 4]);
         assert_eq!(numbers("1-8x3"), [1, 4, 7]);
+        assert_eq!(numbers("1-8:3"), [1, 4, 7]);
         assert_eq!(numbers("9, 1-2,20-30x10"), [9, 1, 2, 20, 30]);
         assert_eq!(numbers("-3--1"), [-3, -2, -1]);
         assert_eq!(numbers("-1-1"), [-1, 0, 1]);
