@@ -138,6 +138,10 @@ impl LightMeshes {
             };
             // Before anything is changed: an error leaves all as it is.
             let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
+            if self.indirect_identity.is_some() {
+                // Views are interpolated from points of the mesh that goes.
+                (self.views, self.known_views) = (Vec::new(), Vec::new());
+            }
             self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
             self.surface = of_form(true)
                 .zip(width)
