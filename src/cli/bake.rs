@@ -79,7 +79,8 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     let mut boxes: Vec<Bounds> =
         corners.iter().map(|&[a, b]| Bounds { min: a.min(b), max: a.max(b) }).collect();
     if args.whole {
-        boxes.push(session.scene().bounds());
+        // As far as points matter to any surface.
+        boxes.push(Bounds { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY });
     }
     if seen.is_empty() && boxes.is_empty() {
         seen.extend(cameras.iter().enumerate());

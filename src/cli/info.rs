@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::error::{CommandError, Outcome};
 use super::image_info::ImageInfo;
+use super::mesh_info::MeshInfo;
 use super::shared::{QuietArgs, SceneArgs};
 use crate::accel::{Footprint, MemoryEstimate};
 use crate::scene::LightKind;
@@ -114,6 +115,15 @@ impl Info {
 /// # Errors
 /// See [`CommandError`].
 pub fn run(args: &InfoArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
+    if MeshInfo::is_for(&args.scene.path) {
+        let info = MeshInfo::read(&args.scene.path)?;
+        if args.json {
+            writeln!(out, "{}", serde_json::json!(info))?;
+        } else {
+            info.print(out)?;
+        }
+        return Ok(Outcome::Passed);
+    }
     if ImageInfo::is_for(&args.scene.path) {
         let info = ImageInfo::read(&args.scene.path)?;
         if args.json {

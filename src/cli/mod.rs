@@ -23,6 +23,7 @@ mod layers;
 mod light_mesh;
 mod man;
 mod merge;
+mod mesh_info;
 mod overrides;
 mod parse;
 mod partial;
@@ -71,7 +72,7 @@ enum Command {
     Probe(Box<probe::ProbeArgs>),
     /// Write mesh points and their light, for ParaView and others.
     Export(export::ExportArgs),
-    /// Report what a scene file, model or EXR image holds.
+    /// Report what a scene file, model, EXR image or light mesh holds.
     Info(info::InfoArgs),
     /// Write a scene file for a model, with the camera, lights and settings that were chosen.
     Init(init::InitArgs),

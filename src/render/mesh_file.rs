@@ -224,6 +224,44 @@ pub fn read_known_points(path: &Path) -> Result<KnownPoints, MeshFileError> {
     Ok(DirectMesh::restore(bounds, &lights, &file)?.known(&lights))
 }
 
+/// What a file of light meshes holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LightMeshSummary {
+    /// Fingerprint of the scene that it belongs to.
+    pub scene: String,
+    /// Lights that bits are of; a lamp with a size is several.
+    pub lights: usize,
+    /// Known points of direct light.
+    pub points: usize,
+    /// Layers that these belong to.
+    pub spacings: usize,
+    /// Views whose settings are known.
+    pub views: usize,
+    /// Whether there is light from surfaces.
+    pub light_from_surfaces: bool,
+    /// Names and lengths of the sections, bytes.
+    pub sections: Vec<(String, usize)>,
+}
+
+/// Reads what a file of light meshes holds; needs no scene.
+///
+/// # Errors
+/// See [`MeshFileError`].
+pub fn light_mesh_summary(path: &Path) -> Result<LightMeshSummary, MeshFileError> {
+    let file = MeshFile::open(path)?;
+    let (identity, lights) = (file.value::<Identity>(IDENTITY)?, file.value::<PackedLights>(LIGHTS)?);
+    let direct = DirectMesh::restore(identity.bounds, &lights, &file)?;
+    Ok(LightMeshSummary {
+        scene: identity.scene.to_string(),
+        lights: lights.len(),
+        points: direct.store().positions().len(),
+        spacings: direct.store().points.layers().count(),
+        views: file.value::<Vec<KnownView>>(VIEWS)?.len(),
+        light_from_surfaces: identity.indirect.is_some(),
+        sections: file.sections().map(|(name, length)| (name.to_owned(), length)).collect(),
+    })
+}
+
 /// A file beside a file of light meshes, which whoever changes that one holds: the other is replaced, and can't be held itself.
 fn lock_path(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -38,7 +38,9 @@ pub use error::{RenderError, SessionError};
 pub use film::{TileSink, resolve};
 pub use frame::{BlockIntegrator, StopToken, shade_tile};
 pub use layers::{FirstHits, Layer, LayerChannel, LayerChoice, LayerCollector, LayerImage, LightParts};
-pub use mesh_file::{RestoredMeshes, WriteMeshesError, read_known_points};
+pub use mesh_file::{
+    LightMeshSummary, RestoredMeshes, WriteMeshesError, light_mesh_summary, read_known_points,
+};
 pub(crate) use meshes::surface_width;
 pub use meshes::{LightMeshes, MeshInterpolation};
 pub use moving::Moved;

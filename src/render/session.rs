@@ -187,6 +187,13 @@ impl Session {
         meshes.renew_lights(lights);
         let interpolation = meshes.interpolation(scene, camera, settings)?.direct;
         let mut evaluation = DirectEvaluation::default();
+        // No surface is interpolated from points that are further away.
+        let (scene, reach) = (scene.bounds(), interpolation.neighbourhoods.radius());
+        let bounds =
+            Bounds { min: bounds.min.max(scene.min - reach), max: bounds.max.min(scene.max + reach) };
+        if bounds.is_empty() {
+            return Ok(evaluation);
+        }
         for part in interpolation.neighbourhoods.parts_of(bounds) {
             stop.check()?;
             let needed = meshes.direct.points_in(&interpolation, part);

@@ -90,6 +90,9 @@ fn other_and_damaged_files_have_exit_codes_of_their_own() {
     let scene = fs::read_to_string(folder.join("interior.toml")).expect("a scene");
     let moved = scene + "\n[[light]]\nposition = [0.5, 1.0, 0.5]\nintensity = 0.1\n";
     fs::write(folder.join("moved.toml"), moved).expect("writable");
+    let info = command(folder, &["info", "field.lmesh"]).stdout(Stdio::piped()).output().expect("it runs");
+    let info = String::from_utf8_lossy(&info.stdout).into_owned();
+    assert!(info.contains("views      1\n") && info.contains("surfaces   with light"), "{info}");
     let render = |scene: &str, name: &str| {
         run(
             folder,

@@ -106,13 +106,18 @@ impl MeshFile {
     /// # Errors
     /// See [`MeshFileError`].
     pub fn open(path: &Path) -> Result<Self, MeshFileError> {
-        let length = std::fs::metadata(path).map_err(MeshFileError::Read)?.len();
-        if length < HEADER as u64 {
+        let data = std::fs::metadata(path).map_err(MeshFileError::Read)?;
+        if !data.is_file() || data.len() < HEADER as u64 {
             return Err(MeshFileError::Foreign);
         }
         let map = MappedFile::open(path).map_err(MeshFileError::Read)?;
         let sections = read_table(&map)?;
         Ok(Self { map: Arc::new(map), sections })
+    }
+
+    /// Names and lengths of all sections, bytes.
+    pub fn sections(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.sections.iter().map(|(name, range)| (name.as_str(), range.len()))
     }
 
     /// The bytes of a section, if there is one of that name.
