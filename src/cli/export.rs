@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::error::{CommandError, Outcome};
+use super::frames::FrameArgs;
+use super::overrides::Overrides;
+use super::ready::{ReadyScene, cameras_of, ready_scene};
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
-use crate::accel::Backend;
 use crate::export::{PointField, encode_ply, encode_vtu};
-use crate::framing::choose_view;
 use crate::image::{ImageError, OutputFile};
 use crate::light_mesh::direct::KnownPoints;
-use crate::render::{Session, read_known_points};
+use crate::render::read_known_points;
 use crate::settings::Integrator;
 
 /// What `export` takes.
@@ -96,31 +97,17 @@ fn baked_points(path: &Path) -> Result<KnownPoints, CommandError> {
 fn points_of_views(args: &ExportArgs) -> Result<KnownPoints, CommandError> {
     let reporter = args.quiet.reporter();
     let scene = SceneArgs { path: args.input.clone() };
-    let opened = scene.open(&reporter)?;
-    let choice = args.backend.backend;
-    args.memory.check(&scene, &opened.loaded.scene, &[choice])?;
-    let chosen = Backend::build(choice, &opened.loaded.scene)?;
-    let view = choose_view(&opened, &chosen.backend);
-    let loaded = view.complete(opened).loaded;
-    let path = &args.input;
-    if let Some(name) =
-        args.camera.iter().find(|name| !loaded.cameras.iter().any(|camera| camera.name == **name))
-    {
-        let names = loaded.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
-        return Err(CommandError::NoSuchCamera { scene: path.clone(), name: name.clone(), names });
-    }
-    let mut settings = loaded.settings;
+    let (overrides, frames) = (Overrides::default(), FrameArgs::default());
+    let ready = ready_scene(&scene, args.backend, args.memory, &overrides, &frames, &reporter)?;
+    let ReadyScene { mut session, cameras, mut settings, .. } = ready;
     settings.shading.integrator = Integrator::LightMesh;
     settings.mesh.indirect = None;
     settings.limits.max_error = None;
-    let mut session = Session::with_backend(loaded.scene, chosen.backend)
-        .map_err(|source| CommandError::Session { scene: path.clone(), source })?;
-    let asked = |name: &String| args.camera.is_empty() || args.camera.contains(name);
-    for camera in loaded.cameras.iter().filter(|camera| asked(&camera.name)) {
+    for camera in cameras_of(&scene, &cameras, &args.camera)? {
         let spinner = reporter.spinner("evaluating");
         let rendered = session.render(camera, &settings);
         spinner.finish_and_clear();
-        rendered.map_err(|source| CommandError::Render { scene: path.clone(), source })?;
+        rendered.map_err(|source| CommandError::Render { scene: scene.path.clone(), source })?;
     }
     Ok(session.known_points())
 }

@@ -115,29 +115,27 @@ impl Info {
 /// # Errors
 /// See [`CommandError`].
 pub fn run(args: &InfoArgs, out: &mut dyn Write) -> Result<Outcome, CommandError> {
-    if MeshInfo::is_for(&args.scene.path) {
-        let info = MeshInfo::read(&args.scene.path)?;
-        if args.json {
-            writeln!(out, "{}", serde_json::json!(info))?;
-        } else {
-            info.print(out)?;
-        }
-        return Ok(Outcome::Passed);
+    let path = &args.scene.path;
+    if MeshInfo::is_for(path) {
+        show(args, out, &MeshInfo::read(path)?, MeshInfo::print)
+    } else if ImageInfo::is_for(path) {
+        show(args, out, &ImageInfo::read(path)?, ImageInfo::print)
+    } else {
+        show(args, out, &Info::new(&args.scene.read(&args.quiet.reporter())?), Info::print)
     }
-    if ImageInfo::is_for(&args.scene.path) {
-        let info = ImageInfo::read(&args.scene.path)?;
-        if args.json {
-            writeln!(out, "{}", serde_json::json!(info))?;
-        } else {
-            info.print(out)?;
-        }
-        return Ok(Outcome::Passed);
-    }
-    let info = Info::new(&args.scene.read(&args.quiet.reporter())?);
+}
+
+/// Prints what was found for people, or for programs.
+fn show<T: Serialize>(
+    args: &InfoArgs,
+    out: &mut dyn Write,
+    info: &T,
+    print: impl Fn(&T, &mut dyn Write) -> io::Result<()>,
+) -> Result<Outcome, CommandError> {
     if args.json {
         writeln!(out, "{}", serde_json::json!(info))?;
     } else {
-        info.print(out)?;
+        print(info, out)?;
     }
     Ok(Outcome::Passed)
 }

@@ -10,7 +10,6 @@ use super::layers;
 use super::partial::PartialPictures;
 use super::progress::Reporter;
 use super::ready::ReadyScene;
-use super::region::RASTER;
 use super::render_args::RenderArgs;
 use super::resume::{ResumableTiles, Resumed};
 use super::sinks::Sinks;
@@ -19,7 +18,7 @@ use super::written::{Written, is_written};
 use crate::accel::Accel;
 use crate::image::output::{ImageOptions, OutputTarget};
 use crate::image::{Image, Window, exr::SampleType, tone::auto_exposure};
-use crate::render::{LayerCollector, LayerImage, RenderError, RenderStats, TileSink};
+use crate::render::{LayerCollector, LayerImage, RenderError, RenderStats, TILE, TileSink};
 use crate::scene::Camera;
 
 /// What renders one image after the other.
@@ -91,7 +90,7 @@ impl Job<'_> {
         let bar = reporter.bar("rendering");
         let whole = Window::whole(settings.view.resolution);
         // A part is rendered tile by tile.
-        let part = settings.view.crop.map_or(whole, |crop| crop.on_raster(RASTER, settings.view.resolution));
+        let part = settings.view.crop.map_or(whole, |crop| crop.on_raster(TILE, settings.view.resolution));
         let pixels = u64::from(part.width) * u64::from(part.height);
         bar.set(0, pixels);
         let server = args.display_server.as_deref();

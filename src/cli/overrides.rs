@@ -75,10 +75,28 @@ impl Overrides {
         Self { integrator: Some(Integrator::Conventional), ..Self::default() }
     }
 
+    /// Light from surfaces with so many bounces, or none of it.
+    pub fn of_indirect(bounces: Option<Bounces>) -> Self {
+        Self { indirect: bounces, ..Self::default() }
+    }
+
     /// Replaces the settings that flags were given for.
     pub fn apply(&self, settings: &mut Settings) {
         self.apply_to_direct_light(settings);
-        apply_indirect(self.indirect, settings);
+        self.apply_to_indirect_light(settings);
+    }
+
+    fn apply_to_indirect_light(&self, settings: &mut Settings) {
+        match self.indirect {
+            Some(Bounces(0)) => settings.mesh.indirect = None,
+            Some(Bounces(bounces)) => {
+                if settings.mesh.indirect.is_none() {
+                    settings.derive_indirect();
+                }
+                settings.mesh.indirect.iter_mut().for_each(|indirect| indirect.bounces = bounces);
+            }
+            None => {}
+        }
     }
 
     fn apply_to_direct_light(&self, settings: &mut Settings) {
@@ -101,20 +119,6 @@ impl Overrides {
         limits.estimator_open &= self.estimator.is_none();
         set(&mut limits.time, self.time_limit.map(|limit| limit.0));
         set(&mut limits.steps, self.steps);
-    }
-}
-
-/// Adds indirect light with so many bounces, or leaves it out, if a flag was given for it.
-pub fn apply_indirect(bounces: Option<Bounces>, settings: &mut Settings) {
-    match bounces {
-        Some(Bounces(0)) => settings.mesh.indirect = None,
-        Some(Bounces(bounces)) => {
-            if settings.mesh.indirect.is_none() {
-                settings.derive_indirect();
-            }
-            settings.mesh.indirect.iter_mut().for_each(|indirect| indirect.bounces = bounces);
-        }
-        None => {}
     }
 }
 

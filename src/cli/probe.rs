@@ -6,21 +6,18 @@ use clap::Args;
 use glam::{UVec3, Vec3};
 
 use super::error::{CommandError, Outcome};
-use super::overrides::apply_indirect;
+use super::frames::FrameArgs;
+use super::overrides::Overrides;
 use super::parse::{self, Bounces};
-use super::progress::Reporter;
+use super::ready::{ReadyScene, ready_scene};
 use super::shared::{BackendArgs, MemoryArgs, QuietArgs, SceneArgs, ThreadArgs};
 use crate::Bounds;
-use crate::accel::Backend;
-use crate::framing::choose_view;
 use crate::image::exr::{SampleType, encode};
 use crate::image::{ImageError, OutputFile, png};
 use crate::probe::{
     GridFile, Plane, Probe, ProbeGrid, ProbeSettings, Unit, encode_grid_bytes, encode_grid_json,
     encode_grid_vti, false_colours, line, load_probes, luminous_map, measure, measure_harmonics, write_table,
 };
-use crate::render::Session;
-use crate::settings::Settings;
 
 /// What `probe` takes.
 ///
@@ -181,7 +178,9 @@ pub fn run(args: &ProbeArgs) -> Result<Outcome, CommandError> {
 
 fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(), CommandError> {
     let reporter = args.quiet.reporter();
-    let (session, settings, bare) = open(args, &reporter)?;
+    let (overrides, frames) = (Overrides::of_indirect(args.indirect), FrameArgs::default());
+    let ready = ready_scene(&args.scene, args.backend, args.memory, &overrides, &frames, &reporter)?;
+    let ReadyScene { session, settings, bare, .. } = ready;
     let default_unit = if bare { Unit::LUMEN } else { Unit::WATT };
     let unit = args.lumens_per_watt.map_or(default_unit, |lumens_per_watt| Unit { lumens_per_watt });
     let how = ProbeSettings { directions: args.directions };
@@ -231,27 +230,6 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
         }
     }
     Ok(())
-}
-
-/// The scene as a session, its settings, and whether it is a bare model.
-fn open(args: &ProbeArgs, reporter: &Reporter) -> Result<(Session, Settings, bool), CommandError> {
-    let mut opened = args.scene.open(reporter)?;
-    apply_indirect(args.indirect, &mut opened.loaded.settings);
-    let spinner = reporter.spinner("building");
-    let choice = args.backend.backend;
-    args.memory.check(&args.scene, &opened.loaded.scene, &[choice])?;
-    let chosen = Backend::build(choice, &opened.loaded.scene)?;
-    spinner.finish_and_clear();
-    if let Some(notice) = &chosen.notice {
-        reporter.line(&format!("note: {notice}"));
-    }
-    // The lights that a bare model lacks.
-    let view = choose_view(&opened, &chosen.backend);
-    let opened = view.complete(opened);
-    opened.choices.iter().for_each(|choice| reporter.line(&format!("note: {choice}")));
-    let session = Session::with_backend(opened.loaded.scene, chosen.backend)
-        .map_err(|source| CommandError::Session { scene: args.scene.path.clone(), source })?;
-    Ok((session, opened.loaded.settings, opened.bare))
 }
 
 fn refused(target: &OutputFile, cause: &dyn std::error::Error) -> ImageError {

@@ -75,6 +75,21 @@ pub fn ready_scene(
     Ok(ReadyScene { session, cameras, animation, settings, bare, seconds })
 }
 
+/// The cameras of some names, or all if there is no name.
+///
+/// # Errors
+/// [`CommandError::NoSuchCamera`].
+pub fn cameras_of<'a>(
+    args: &SceneArgs,
+    cameras: &'a [Camera],
+    names: &[String],
+) -> Result<Vec<&'a Camera>, CommandError> {
+    if names.is_empty() {
+        return Ok(cameras.iter().collect());
+    }
+    names.iter().map(|name| Ok(camera_of(args, cameras, Some(name))?.1)).collect()
+}
+
 /// The camera of a name, or the first one, with its number.
 ///
 /// # Errors

@@ -6,9 +6,7 @@ use clap::Args;
 
 use super::error::CommandError;
 use crate::image::Window;
-
-/// Edge of the raster along which an image is cut into tiles, pixels.
-pub const RASTER: u32 = 32;
+use crate::render::TILE;
 
 /// Part of the image to render.
 #[derive(Args, Clone, Copy, Debug, Default)]
@@ -68,9 +66,9 @@ impl RegionArgs {
             };
         }
         let Some(Part { number, count }) = self.tile else { return Ok(None) };
-        let window = Window::part(resolution, RASTER, number, count);
+        let window = Window::part(resolution, TILE, number, count);
         window.map(Some).ok_or_else(|| {
-            refuse(format!("--tile can't cut it into {count} rectangles along a raster of {RASTER} pixels"))
+            refuse(format!("--tile can't cut it into {count} rectangles along a raster of {TILE} pixels"))
         })
     }
 }

@@ -11,6 +11,9 @@ use crate::settings::{OutputSettings, Settings};
 /// What was found for a view.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct KnownView {
+    /// Whether a file knows it: those of this session are measured anew.
+    #[serde(skip, default = "yes")]
+    pub of_file: bool,
     /// Of the camera and the settings.
     pub identity: Fingerprint,
     /// What was chosen where the settings left it open.
@@ -32,9 +35,13 @@ impl KnownView {
         let accuracy = stats.accuracy;
         let is_whole = accuracy.is_none_or(|accuracy| accuracy.ending != Ending::Time);
         let identity = identity(camera, settings);
-        let known = |settled| Self { identity, settled, accuracy, records };
+        let known = |settled| Self { of_file: false, identity, settled, accuracy, records };
         stats.settled.filter(|_| is_whole).map(known)
     }
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// What makes two views the same: all but which part of them is rendered and how it is written.

@@ -106,7 +106,7 @@ impl LightMeshes {
         if let Some(surface) = &self.surface {
             writer.value(SURFACE, &surface.saved())?;
         }
-        writer.value(VIEWS, &self.views.iter().collect::<Vec<_>>())?;
+        writer.value(VIEWS, &self.views)?;
         Ok(writer.finish())
     }
 
@@ -150,10 +150,9 @@ impl LightMeshes {
             }
         }
         if looks_alike {
-            meshes.known_views = file.value::<Vec<KnownView>>(VIEWS)?;
-            restored.views = meshes.known_views.len();
+            meshes.views = file.value::<Vec<KnownView>>(VIEWS)?;
+            restored.views = meshes.views.len();
         }
-        meshes.views = meshes.known_views.clone();
         Ok((meshes, restored))
     }
 

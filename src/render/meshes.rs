@@ -32,8 +32,6 @@ pub struct LightMeshes {
     indirect_identity: Option<IndirectIdentity>,
     /// Views that were rendered, or that a file knows.
     pub(super) views: Vec<KnownView>,
-    /// Those of a file, which are taken as they are.
-    pub(super) known_views: Vec<KnownView>,
 }
 
 /// The meshes of indirect light, while others are rendered.
@@ -104,7 +102,6 @@ impl LightMeshes {
             surface: None,
             indirect_identity: None,
             views: Vec::new(),
-            known_views: Vec::new(),
         }
     }
 
@@ -140,7 +137,7 @@ impl LightMeshes {
             let width = of_form(true).map(|indirect| surface_width(indirect, bounds)).transpose()?;
             if self.indirect_identity.is_some() {
                 // Views are interpolated from points of the mesh that goes.
-                (self.views, self.known_views) = (Vec::new(), Vec::new());
+                self.views.clear();
             }
             self.indirect = of_form(false).map(|indirect| IndirectMesh::new(bounds, indirect));
             self.surface = of_form(true)
@@ -206,7 +203,7 @@ impl LightMeshes {
     pub(super) fn forget_intensities(&mut self) {
         self.direct.forget_intensities();
         (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
-        (self.views, self.known_views) = (Vec::new(), Vec::new());
+        self.views.clear();
     }
 
     /// Fingerprint of what light from surfaces follows from, if there is any.
@@ -238,22 +235,21 @@ impl LightMeshes {
         Ok(())
     }
 
-    /// Remembers a view that was rendered.
+    /// Remembers a view that was rendered, unless a file knows it.
     pub(super) fn remember(&mut self, camera: &Camera, settings: &Settings, stats: &RenderStats) {
         let records = self.surface.as_ref().map(SurfaceMesh::view_records).unwrap_or_default();
-        if let Some(view) = KnownView::of(camera, settings, stats, records) {
-            self.views.retain(|known| known.identity != view.identity);
-            self.views.push(view);
+        let Some(view) = KnownView::of(camera, settings, stats, records) else { return };
+        match self.views.iter_mut().find(|known| known.identity == view.identity) {
+            Some(known) if known.of_file => {}
+            Some(known) => *known = view,
+            None => self.views.push(view),
         }
     }
 
     /// What a file knows of a view.
     pub(super) fn known_view(&self, camera: &Camera, settings: &Settings) -> Option<&KnownView> {
-        if self.known_views.is_empty() {
-            return None;
-        }
         let identity = identity(camera, settings);
-        self.known_views.iter().find(|view| view.identity == identity)
+        self.views.iter().find(|view| view.of_file && view.identity == identity)
     }
 
     /// Forgets what may be otherwise after geometry in some boxes, where it was and where it is, has moved, or lights; `lights` are those before
@@ -265,7 +261,7 @@ impl LightMeshes {
         lights: [&SceneLights; 2],
     ) -> KeptBits {
         (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
-        (self.views, self.known_views) = (Vec::new(), Vec::new());
+        self.views.clear();
         let [before, after] = lights.map(|lights| {
             lights
                 .with_emitters

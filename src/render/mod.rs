@@ -52,5 +52,5 @@ pub use settled::Settled;
 pub use stats::{
     HybridError, MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds,
 };
-pub use tiles::Tile;
+pub use tiles::{TILE, Tile};
 pub use trace::trace_paths;

@@ -79,6 +79,12 @@ impl Session {
         World { accel: backend, scene, lights: lights.of_settings(settings), emissive }
     }
 
+    /// The same, and the light meshes for change.
+    fn split(&mut self, settings: &Settings) -> (World<'_, Backend>, &mut LightMeshes) {
+        let Self { scene, backend, lights, emissive, meshes } = self;
+        (World { accel: backend, scene, lights: lights.of_settings(settings), emissive }, meshes)
+    }
+
     /// The points of the direct light mesh that are known by now, with their light; costs no ray.
     pub fn known_points(&mut self) -> KnownPoints {
         let Self { lights, meshes, .. } = self;
@@ -143,9 +149,7 @@ impl Session {
         stop: &StopToken,
         layers: Option<&LayerCollector>,
     ) -> Result<(Image, RenderStats), RenderError> {
-        let Self { scene, backend, lights, emissive, meshes } = self;
-        let lights = lights.of_settings(settings);
-        let world = World { accel: &*backend, scene, lights, emissive };
+        let (world, meshes) = self.split(settings);
         let shown = Shown { camera, sink, stop, layers, purpose: Purpose::Image };
         render_world(world, shown, settings, meshes)
     }
@@ -161,9 +165,7 @@ impl Session {
         sink: &dyn TileSink,
         stop: &StopToken,
     ) -> Result<RenderStats, RenderError> {
-        let Self { scene, backend, lights, emissive, meshes } = self;
-        let lights = lights.of_settings(settings);
-        let world = World { accel: &*backend, scene, lights, emissive };
+        let (world, meshes) = self.split(settings);
         let shown = Shown { camera, sink, stop, layers: None, purpose: Purpose::Meshes };
         Ok(render_world(world, shown, settings, meshes)?.1)
     }
@@ -181,14 +183,12 @@ impl Session {
         stop: &StopToken,
     ) -> Result<DirectEvaluation, RenderError> {
         settings.check()?;
-        let Self { scene, backend, lights, emissive, meshes } = self;
-        let lights = lights.of_settings(settings);
-        let world = World { accel: &*backend, scene, lights, emissive };
-        meshes.renew_lights(lights);
-        let interpolation = meshes.interpolation(scene, camera, settings)?.direct;
+        let (world, meshes) = self.split(settings);
+        meshes.renew_lights(world.lights);
+        let interpolation = meshes.interpolation(world.scene, camera, settings)?.direct;
         let mut evaluation = DirectEvaluation::default();
         // No surface is interpolated from points that are further away.
-        let (scene, reach) = (scene.bounds(), interpolation.neighbourhoods.radius());
+        let (scene, reach) = (world.scene.bounds(), interpolation.neighbourhoods.radius());
         let bounds =
             Bounds { min: bounds.min.max(scene.min - reach), max: bounds.max.min(scene.max + reach) };
         if bounds.is_empty() {

@@ -1,14 +1,14 @@
 //! Files of any set of channels: what is written comes back, to the last bit, and what can't be written is refused.
 
 use lightmesh::image::exr::{
-    Channel, ChannelImage, SampleType, Samples, Window, decode_channels, encode, encode_channels, f16,
+    Channel, ChannelImage, DataWindow, SampleType, Samples, decode_channels, encode, encode_channels, f16,
 };
 use lightmesh::image::{self, Image};
 
 use crate::common::data::run;
 
 /// Width and height of the pictures here: more than one block of 16 rows.
-const WINDOW: Window = Window { x: 3, y: 5, width: 7, height: 19 };
+const WINDOW: DataWindow = DataWindow { x: 3, y: 5, width: 7, height: 19 };
 
 /// Bits from a fixed sequence: all kinds of numbers, not-a-numbers among them.
 fn bits(seed: u32) -> impl Iterator<Item = u32> {
@@ -63,7 +63,7 @@ fn channels_come_back_to_the_last_bit() {
 fn an_image_is_the_channels_r_g_b_of_its_whole_window() {
     let picture = Image::from_pixels(3, 1, vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 1e9]]).unwrap();
     let read = decode_channels(&encode(&picture, SampleType::Half, &[]).unwrap()).unwrap();
-    assert_eq!((read.display, read.window), ((3, 1), Window { x: 0, y: 0, width: 3, height: 1 }));
+    assert_eq!((read.display, read.window), ((3, 1), DataWindow { x: 0, y: 0, width: 3, height: 1 }));
     let values = |name| {
         let samples = &read.channel(name).unwrap().samples;
         (0..samples.len()).map(|i| samples.get(i).unwrap()).collect::<Vec<_>>()

@@ -13,7 +13,7 @@ pub struct ChannelImage {
     /// Width and height of the display window, the whole picture, whose top left pixel is (0, 0).
     pub display: (u32, u32),
     /// The data window: which of its pixels there are.
-    pub window: Window,
+    pub window: DataWindow,
     /// The channels, each with one sample per pixel of the data window.
     pub channels: Vec<Channel>,
     /// String attributes: names and values.
@@ -22,7 +22,7 @@ pub struct ChannelImage {
 
 /// A rectangle of pixels, counted from the top left pixel of the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
+pub struct DataWindow {
     /// Left column.
     pub x: i32,
     /// Top row.
@@ -55,7 +55,7 @@ pub enum Samples {
 
 impl ChannelImage {
     /// A file without channels and attributes.
-    pub fn new(display: (u32, u32), window: Window) -> Self {
+    pub fn new(display: (u32, u32), window: DataWindow) -> Self {
         Self { display, window, channels: Vec::new(), metadata: Vec::new() }
     }
 
@@ -89,7 +89,7 @@ impl ChannelImage {
     }
 }
 
-impl Window {
+impl DataWindow {
     /// All of a display window of this width and height.
     pub fn of_display((width, height): (u32, u32)) -> Self {
         Self { x: 0, y: 0, width, height }
@@ -102,7 +102,7 @@ impl Window {
 }
 
 /// As far as the format's signed numbers reach.
-impl TryFrom<image::Window> for Window {
+impl TryFrom<image::Window> for DataWindow {
     type Error = std::num::TryFromIntError;
 
     fn try_from(window: image::Window) -> Result<Self, Self::Error> {
@@ -111,7 +111,7 @@ impl TryFrom<image::Window> for Window {
     }
 }
 
-impl std::fmt::Display for Window {
+impl std::fmt::Display for DataWindow {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { x, y, width, height } = self;
         write!(f, "{width} by {height} pixels at ({x}, {y})")

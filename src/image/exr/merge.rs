@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Channel, ChannelImage, Samples, Window};
+use super::{Channel, ChannelImage, DataWindow, Samples};
 
 /// Why parts are no picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -51,7 +51,7 @@ pub fn merge(parts: &[ChannelImage], identity: &[&str]) -> Result<ChannelImage, 
         check_same(first, other, identity).map_err(|what| MergeError::Different { part, what })?;
     }
     let (width, height) = first.display;
-    let mut whole = ChannelImage::new(first.display, Window::of_display(first.display));
+    let mut whole = ChannelImage::new(first.display, DataWindow::of_display(first.display));
     let in_all = |entry: &(String, String)| parts.iter().all(|part| part.metadata.contains(entry));
     for entry in &first.metadata {
         if in_all(entry) {
@@ -147,7 +147,7 @@ fn check_same(first: &ChannelImage, other: &ChannelImage, identity: &[&str]) -> 
 
 /// Where each sample of a part lies in the whole; `None` for those that lie beyond it.
 fn places(part: &ChannelImage, (width, height): (u32, u32)) -> Vec<Option<usize>> {
-    let Window { x, y, width: columns, height: rows } = part.window;
+    let DataWindow { x, y, width: columns, height: rows } = part.window;
     let within = |start: i32, offset: u32, end: u32| {
         u32::try_from(i64::from(start) + i64::from(offset)).ok().filter(|at| *at < end)
     };
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     fn part(x: i32, width: u32, value: f32) -> ChannelImage {
-        let mut image = ChannelImage::new((4, 1), Window { x, y: 0, width, height: 1 });
+        let mut image = ChannelImage::new((4, 1), DataWindow { x, y: 0, width, height: 1 });
         let values: Vec<f32> = (0..width).map(|i| value + (x + i as i32) as f32).collect();
         image.channels.push(Channel::new("Z", Samples::Float(values)));
         image.metadata = vec![("scene".into(), "a".into()), ("rays".into(), x.to_string())];
@@ -195,7 +195,7 @@ mod tests {
         let whole = merge(&[part(2, 2, 0.0), part(0, 3, 0.0)], &["scene"]).unwrap();
         assert_eq!(whole.channels, [Channel::new("Z", Samples::Float(vec![0.0, 1.0, 2.0, 3.0]))]);
         assert_eq!(whole.metadata, [("scene".to_owned(), "a".to_owned())]);
-        assert_eq!(whole.window, Window::of_display((4, 1)));
+        assert_eq!(whole.window, DataWindow::of_display((4, 1)));
     }
 
     /// Each part of a Cryptomatte layer names what it shows; the whole names all.

@@ -11,7 +11,7 @@ use ::exr::math::Vec2;
 use ::exr::meta::attribute::Chromaticities;
 
 pub use ::exr::prelude::f16;
-pub use channels::{Channel, ChannelImage, Samples, Window};
+pub use channels::{Channel, ChannelImage, DataWindow, Samples};
 pub use merge::{MergeError, merge};
 pub use read::decode;
 pub use read_channels::{decode_channels, metadata};

@@ -7,7 +7,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::f16;
 
 use super::blocks::{check_sizes, damaged, offset, open, read_blocks, unsupported, without_panic};
-use super::{Channel, ChannelImage, Samples, Window};
+use super::{Channel, ChannelImage, DataWindow, Samples};
 use crate::image::DecodeError;
 
 /// A file of n bytes may claim `FREE_BYTES` + n · `BYTES_PER_BYTE` bytes of samples: no compression of the format makes more than half of
@@ -69,7 +69,7 @@ fn windows(header: &Header) -> Result<ChannelImage, DecodeError> {
     let place = |offset: i64| i32::try_from(offset).map_err(out_of_range);
     let (x, y) = offset(header);
     let (display, size) = (header.shared_attributes.display_window.size, header.layer_size);
-    let window = Window { x: place(x)?, y: place(y)?, width: side(size.0)?, height: side(size.1)? };
+    let window = DataWindow { x: place(x)?, y: place(y)?, width: side(size.0)?, height: side(size.1)? };
     Ok(ChannelImage::new((side(display.0)?, side(display.1)?), window))
 }
 

@@ -10,7 +10,7 @@ use ::exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
 use ::exr::meta::header::{ImageAttributes, LayerAttributes};
 use ::exr::prelude::{Blocks, Compression, LineOrder};
 
-use super::{BT_709, Channel, ChannelImage, SampleType, Samples, Window};
+use super::{BT_709, Channel, ChannelImage, DataWindow, SampleType, Samples};
 use crate::image::{self, Image};
 
 /// Encodes `image` as one layer with the channels R, G, B, compressed with ZIP in blocks of 16 rows.
@@ -38,7 +38,7 @@ pub fn encode_part(
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>> {
     let beyond = || Error::Invalid("a part beyond the picture".into());
-    let mut file = ChannelImage::new(display, Window::try_from(window).map_err(|_| beyond())?);
+    let mut file = ChannelImage::new(display, DataWindow::try_from(window).map_err(|_| beyond())?);
     for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
         let values = part.pixels().iter().map(|pixel| pixel[index]);
         file.channels.push(Channel::new(name, Samples::of(sample_type, values)));

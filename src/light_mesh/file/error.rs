@@ -10,7 +10,7 @@ pub enum MeshFileError {
     #[error("cannot be read")]
     Read(#[source] io::Error),
     /// It is something else.
-    #[error("is no file of light meshes")]
+    #[error("is no file of light meshes, nor of tiles")]
     Foreign,
     /// Another version of the format.
     #[error("has version {found} of the format, which this program does not know")]

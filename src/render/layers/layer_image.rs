@@ -1,12 +1,12 @@
 //! Layers as they are handed out.
 
-use crate::image::exr::Window;
+use crate::image::exr::DataWindow;
 
 /// The layers of a picture, beside the picture itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerImage {
     /// The pixels that were rendered, counted from the top left of the whole picture.
-    pub window: Window,
+    pub window: DataWindow,
     /// The channels of all layers.
     pub channels: Vec<LayerChannel>,
     /// Names and values that go with the channels, such as the names of ids.

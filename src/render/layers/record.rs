@@ -10,7 +10,7 @@ use super::first_hits::{FirstHits, IdSamples};
 use super::layer_image::{LayerChannel, LayerImage};
 use super::parts::LightParts;
 use super::{Layer, LayerChoice};
-use crate::image::exr::Window;
+use crate::image::exr::DataWindow;
 use crate::lights::{PackedGroups, PackedLights};
 use crate::render::paths::TilePaths;
 use crate::render::tiles::Tile;
@@ -214,7 +214,7 @@ impl<'a> LayerRecord<'a> {
         let attributes = attributes.collect();
         let named = channels.into_iter().zip(values);
         LayerImage {
-            window: Window { x: left as i32, y: top as i32, width, height },
+            window: DataWindow { x: left as i32, y: top as i32, width, height },
             channels: named
                 .map(|((name, needs_float), values)| LayerChannel { name, needs_float, values })
                 .collect(),
