@@ -7,7 +7,7 @@ use clap::{ArgAction, Args};
 use glam::Vec3;
 
 use super::error::{CommandError, Outcome};
-use super::frames::FrameArgs;
+use super::frames::{self, FrameArgs};
 use super::interrupt::Interrupt;
 use super::overrides::Overrides;
 use super::parse;
@@ -64,8 +64,8 @@ pub fn run(args: &BakeArgs) -> Result<Outcome, CommandError> {
 fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     let start = Instant::now();
     let reporter = args.quiet.reporter();
-    let frames = &args.frames;
-    let ready = ready_scene(&args.scene, args.backend, args.memory, &args.overrides, frames, &reporter)?;
+    let ready =
+        ready_scene(&args.scene, args.backend, args.memory, &args.overrides, &args.frames, &reporter)?;
     let ReadyScene { mut session, cameras, animation, settings, .. } = ready;
     match session.read_light_meshes(&args.output, &settings) {
         Err(MeshFileError::Read(error)) if error.kind() == std::io::ErrorKind::NotFound => {}
@@ -85,33 +85,36 @@ fn bake(args: &BakeArgs) -> Result<(), CommandError> {
     if seen.is_empty() && boxes.is_empty() {
         seen.extend(cameras.iter().enumerate());
     }
-    let views: Vec<Camera> = match args.frames.numbers(&animation, &args.scene.path)? {
-        None => seen.into_iter().map(|(_, camera)| camera.clone()).collect(),
-        Some(numbers) => {
-            if animation.moves_scene() {
-                reporter.line(
-                    "note: only cameras move here; frames evaluate anew what other motion may have changed",
-                );
-            }
-            let views = numbers.into_iter().flat_map(|number| {
-                let frame = animation.frame(number);
-                seen.iter().map(move |&(index, still)| frame.camera(index, still)).collect::<Vec<_>>()
-            });
-            views.collect()
-        }
-    };
+    let numbers = args.frames.numbers(&animation, &args.scene.path)?;
+    if numbers.is_some() && animation.moves_scene() {
+        reporter
+            .line("note: only cameras move here; frames evaluate anew what other motion may have changed");
+    }
     let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
     let stop = &interrupt.stop;
     let (mut evaluated, mut rays) = (0, 0);
     let (width, height) = settings.view.resolution;
-    for camera in &views {
-        let bar = reporter.bar("baking");
-        bar.set(0, u64::from(width) * u64::from(height));
-        let prepared = session.prepare(camera, &settings, &bar, stop);
-        bar.finish();
-        let stats = prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
-        evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
-        rays += stats.rays.shadow + stats.rays.indirect;
+    for (index, still) in seen {
+        let views: Vec<Camera> = match &numbers {
+            None => vec![still.clone()],
+            Some(numbers) => {
+                numbers.iter().map(|&number| animation.frame(number).camera(index, still)).collect()
+            }
+        };
+        if numbers.is_some() && !animation.moves_scene() {
+            let scene = &args.scene.path;
+            rays += frames::settle(&mut session, &animation, (index, still), &settings, scene, &reporter)?;
+        }
+        for camera in &views {
+            let bar = reporter.bar("baking");
+            bar.set(0, u64::from(width) * u64::from(height));
+            let prepared = session.prepare(camera, &settings, &bar, stop);
+            bar.finish();
+            let stats =
+                prepared.or_else(|error| Err(stopped(args, &session, &settings, &interrupt, error)?))?;
+            evaluated += stats.mesh_points.direct.evaluated + stats.mesh_points.indirect.evaluated;
+            rays += stats.rays.shadow + stats.rays.indirect;
+        }
     }
     let (_, eye) = camera_of(&args.scene, &cameras, None)?;
     for bounds in boxes {

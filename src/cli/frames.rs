@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::error::CommandError;
+use super::interrupt::Interrupt;
 use super::progress::Reporter;
 use crate::image::output::{OutputFile, OutputTarget};
-use crate::render::{Moved, Session, SessionError};
+use crate::render::{Moved, RenderError, Session, SessionError};
 use crate::scene::{Animation, Camera, Scene};
+use crate::settings::Settings;
 
 /// Frames that one command may name.
 const MOST_FRAMES: usize = 1_000_000;
@@ -172,6 +174,52 @@ pub fn move_to(
     let moved = session.move_to(&frame)?;
     reporter.line(&format!("frame {number}: {}", in_words(&moved)));
     Ok(frame.camera(index, still))
+}
+
+/// Frames by which a light mesh is chosen for all of an animation.
+const SETTLED_BY: i64 = 4;
+
+/// Chooses once for all frames what the settings leave open of averaged shadows: by frames all over the animation, whichever of them are rendered, so that each
+/// frame is the same alone and among others. Returns the shadow rays that took.
+///
+/// # Errors
+/// See [`CommandError`].
+pub fn settle(
+    session: &mut Session,
+    animation: &Animation,
+    (index, still): (usize, &Camera),
+    settings: &Settings,
+    scene: &Path,
+    reporter: &Reporter,
+) -> Result<u64, CommandError> {
+    session.unsettle();
+    let Some((first, last)) = animation.range() else { return Ok(0) };
+    let interrupt = Interrupt::catch().map_err(CommandError::Signals)?;
+    let at = |part: i64| first + (last - first) * (2 * part + 1) / (2 * SETTLED_BY);
+    let mut numbers: Vec<i64> = (0..SETTLED_BY).map(at).collect();
+    numbers.dedup();
+    let mut rays = 0;
+    for &number in &numbers {
+        let frame = animation.frame(number);
+        let moved = session.move_to(&frame);
+        moved.map_err(|source| CommandError::Session { scene: scene.to_owned(), source })?;
+        let settled = session.settle(&frame.camera(index, still), settings, &interrupt.stop);
+        rays += match (settled, interrupt.exit_code()) {
+            (Ok(stats), _) => stats.rays.shadow,
+            (Err(RenderError::Stopped), Some(exit_code)) => {
+                return Err(CommandError::Interrupted { exit_code, kept: "nothing was kept".to_owned() });
+            }
+            (Err(source), _) => return Err(CommandError::Render { scene: scene.to_owned(), source }),
+        };
+    }
+    if rays > 0 {
+        let numbers: Vec<String> = numbers.iter().map(i64::to_string).collect();
+        reporter.line(&format!(
+            "note: one light mesh for all frames, chosen by frames {} with {rays} shadow rays",
+            numbers.join(", ")
+        ));
+    }
+    Ok(rays)
 }
 
 fn in_words(moved: &Moved) -> String {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::error::{CommandError, Outcome};
 use super::frames;
 use super::job::Job;
-use super::ready::{camera_of, ready_scene};
+use super::ready::{ReadyScene, camera_of, ready_scene};
 use super::render_args::RenderArgs;
 
 /// Renders a scene file.
@@ -39,9 +39,18 @@ fn render_all(args: &RenderArgs) -> Result<(), CommandError> {
         return args.light_mesh.update(&job.ready.session, &job.ready.settings);
     };
     let moves_scene = animation.moves_scene();
+    let still = (index, &camera);
+    let ReadyScene { session, settings, .. } = &mut job.ready;
+    let is_known = |&number: &i64| {
+        !moves_scene && session.knows_view(&animation.frame(number).camera(index, &camera), settings)
+    };
+    let for_all = if numbers.iter().all(is_known) {
+        0
+    } else {
+        frames::settle(session, &animation, still, settings, &args.scene.path, &reporter)?
+    };
     let mut rays = Vec::new();
     for number in numbers {
-        let still = (index, &camera);
         let moved = frames::move_to(&mut job.ready.session, &animation, Some(number), still, &reporter);
         let moved =
             moved.map_err(|source| CommandError::Session { scene: args.scene.path.clone(), source })?;
@@ -50,7 +59,7 @@ fn render_all(args: &RenderArgs) -> Result<(), CommandError> {
     reporter.line(&format!(
         "{} frames: {} shadow rays, {} of them for the first one",
         rays.len(),
-        rays.iter().sum::<u64>(),
+        for_all + rays.iter().sum::<u64>(),
         rays.first().unwrap_or(&0)
     ));
     if moves_scene && args.light_mesh.updates() {

@@ -42,6 +42,8 @@ pub enum Ending {
     Error,
     /// The settings leave nothing open by which the error could be made smaller.
     Settings,
+    /// One mesh was chosen for several views together.
+    Settled,
     /// No finer light mesh is tried.
     Finest,
     /// The time is over.
@@ -189,6 +191,9 @@ impl fmt::Display for Accuracy {
         match self.ending {
             Ending::Error => write!(f, "; within the {asked} % asked for")?,
             Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
+            Ending::Settled => {
+                write!(f, "; asked for {asked} %, but the light mesh was chosen for several views together")?
+            }
             Ending::Finest => write!(f, "; asked for {asked} %, but no finer mesh is tried")?,
             Ending::Time if self.asked == 0.0 => f.write_str("; the time limit ended it")?,
             Ending::Time => write!(f, "; the time limit ended it, {asked} % were asked for")?,

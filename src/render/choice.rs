@@ -20,7 +20,7 @@ use super::tiles::{TILE, Tile};
 use crate::accel::Accel;
 use crate::lights::PackedLights;
 use crate::scene::Camera;
-use crate::settings::{Estimator, IndirectForm, IndirectSettings, Integrator, Resolve, Settings};
+use crate::settings::{IndirectForm, IndirectSettings, Integrator, Settings};
 use crate::simd::LANES;
 
 /// In images too small for a trial, from so many lights above the horizon on the light mesh is taken.
@@ -56,7 +56,7 @@ pub(super) fn choose<A: Accel>(
     stats: &mut RenderStats,
 ) -> Result<Choice, RenderError> {
     let shading = &settings.shading;
-    let traced = shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight;
+    let traced = shading.is_hybrid();
     // Light from points on surfaces goes with either.
     let in_space = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
     if !traced || settings.mesh.indirect.as_ref().is_some_and(in_space) {

@@ -27,6 +27,8 @@ pub(super) struct View<'a, A> {
     pub stop: &'a StopToken,
     /// What a file knows of it.
     pub known: Option<&'a KnownView>,
+    /// What was chosen for this view and others together.
+    pub settled: Option<Settled>,
     /// What is made of it.
     pub purpose: Purpose,
     pub layers: Option<&'a LayerCollector>,

@@ -46,9 +46,14 @@ fn yes() -> bool {
 
 /// What makes two views the same: all but which part of them is rendered and how it is written.
 pub(super) fn identity(camera: &Camera, settings: &Settings) -> Fingerprint {
+    Fingerprint::of(&(camera, of_views(settings)))
+}
+
+/// The settings without which part of a view is rendered and how it is written.
+pub(super) fn of_views(settings: &Settings) -> Settings {
     let mut settings = settings.clone();
     settings.view.crop = None;
     settings.view.block_samples = None;
     settings.output = OutputSettings::default();
-    Fingerprint::of(&(camera, settings))
+    settings
 }

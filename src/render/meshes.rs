@@ -13,8 +13,8 @@ use crate::light_mesh::surface::SurfaceMesh;
 use crate::lights::PackedLights;
 use crate::scene::{Camera, Fingerprint, Scene};
 use crate::settings::{
-    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Resolve,
-    Settings, Spacing,
+    Estimator, IndirectForm, IndirectSettings, IndirectShading, KernelSettings, PointSettings, Settings,
+    Spacing,
 };
 
 /// Light meshes of a scene; they keep their values from one render to the next, whatever settings follow.
@@ -23,6 +23,8 @@ use crate::settings::{
 /// final values of those that are there, so that views agree with first renders to within the tolerance, not to the bit.
 pub struct LightMeshes {
     pub(super) direct: DirectMesh,
+    /// One whose points lie elsewhere: by how the two differ, errors are measured (method §10).
+    pub(super) other: DirectMesh,
     /// Whether emissive triangles are among the lights that the direct mesh knows.
     has_emitters: bool,
     pub(super) indirect: Option<IndirectMesh>,
@@ -33,6 +35,9 @@ pub struct LightMeshes {
     /// Views that were rendered, or that a file knows.
     pub(super) views: Vec<KnownView>,
 }
+
+/// Where the points of the other mesh lie, in spacings: far from all points of a regular mesh and from the centres of its cells.
+const SHIFT: Vec3 = Vec3::new(0.27, 0.72, 0.23);
 
 /// The meshes of indirect light, while others are rendered.
 pub(super) struct IndirectLight {
@@ -94,9 +99,9 @@ impl MeshInterpolation {
 impl LightMeshes {
     /// Meshes over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
-        let direct = DirectMesh::new(bounds);
         Self {
-            direct,
+            direct: DirectMesh::new(bounds),
+            other: DirectMesh::shifted(bounds, SHIFT),
             has_emitters: false,
             indirect: None,
             surface: None,
@@ -160,7 +165,7 @@ impl LightMeshes {
         settings: &Settings,
     ) -> Result<MeshInterpolation, MeshError> {
         let shading = &settings.shading;
-        let hybrid = shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight;
+        let hybrid = shading.is_hybrid();
         // Values that are averaged must not change their spacing within the picture, nor what indirect light is made of with the view.
         let by_direct = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
         let auto = if hybrid && !settings.mesh.indirect.as_ref().is_some_and(by_direct) {
@@ -184,6 +189,26 @@ impl LightMeshes {
         })
     }
 
+    /// How the other mesh is interpolated by settings whose shadows are averaged. It traces all lights, whatever levels there are.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub(super) fn other_interpolation(
+        &mut self,
+        settings: &Settings,
+    ) -> Result<MeshInterpolation, MeshError> {
+        let Settings { mesh, shading, .. } = settings;
+        let points = PointSettings { levels: 0, ..mesh.direct.clone() };
+        let auto = AutoSpacing::AVERAGED;
+        Ok(MeshInterpolation {
+            direct: self.other.interpolation(&points, &shading.kernel, shading.estimator, auto)?,
+            indirect: None,
+            direct_scale: shading.direct_scale(),
+            hybrid: false,
+            tolerance: shading.tolerance,
+        })
+    }
+
     /// Takes the meshes of indirect light away, to be [put back](Self::put_indirect_back).
     pub(super) fn set_indirect_aside(&mut self) -> IndirectLight {
         IndirectLight {
@@ -202,6 +227,7 @@ impl LightMeshes {
     /// Forgets what depends on the lights' intensities; visibility stays.
     pub(super) fn forget_intensities(&mut self) {
         self.direct.forget_intensities();
+        self.other.forget_intensities();
         (self.indirect, self.surface, self.indirect_identity) = (None, None, None);
         self.views.clear();
     }
@@ -273,6 +299,7 @@ impl LightMeshes {
         let motion = after.and_then(|after| Some((after, Motion::new(boxes, before, after)?)));
         match motion {
             Some((after, motion)) if bounds == self.direct.store().points.bounds() => {
+                self.other.forget_moved(after, &motion);
                 self.direct.forget_moved(after, &motion)
             }
             _ => {
@@ -293,6 +320,7 @@ impl LightMeshes {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.direct.memory_bytes()
+            + self.other.memory_bytes()
             + self.indirect.as_ref().map_or(0, IndirectMesh::memory_bytes)
             + self.surface.as_ref().map_or(0, SurfaceMesh::memory_bytes)
     }

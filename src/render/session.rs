@@ -8,10 +8,12 @@ use super::error::{RenderError, SessionError};
 use super::film::TileSink;
 use super::fixed::View;
 use super::frame::{Purpose, StopToken};
+use super::known_view::of_views;
 use super::layers::LayerCollector;
 use super::mesh_file::{MeshScene, RestoredMeshes, WriteMeshesError};
 use super::meshes::LightMeshes;
 use super::scene_lights::SceneLights;
+use super::settled::Settled;
 use super::stats::RenderStats;
 use crate::Bounds;
 use crate::accel::{Accel, Backend, BackendChoice};
@@ -33,6 +35,8 @@ pub struct Session {
     pub(super) lights: SceneLights,
     pub(super) emissive: EmissiveTriangles,
     pub(super) meshes: LightMeshes,
+    /// What was chosen for several views together, and the settings that left it open.
+    pub(super) settled: Option<(Settings, Settled)>,
 }
 
 impl Session {
@@ -60,7 +64,7 @@ impl Session {
         let lights = SceneLights::of(&scene);
         let emissive = EmissiveTriangles::of_scene(&scene);
         let meshes = LightMeshes::new(scene.bounds());
-        Self { scene, backend, lights, emissive, meshes }
+        Self { scene, backend, lights, emissive, meshes, settled: None }
     }
 
     /// The scene.
@@ -81,7 +85,7 @@ impl Session {
 
     /// The same, and the light meshes for change.
     fn split(&mut self, settings: &Settings) -> (World<'_, Backend>, &mut LightMeshes) {
-        let Self { scene, backend, lights, emissive, meshes } = self;
+        let Self { scene, backend, lights, emissive, meshes, .. } = self;
         (World { accel: backend, scene, lights: lights.of_settings(settings), emissive }, meshes)
     }
 
@@ -106,6 +110,7 @@ impl Session {
         }
         self.lights = SceneLights::of(&self.scene);
         self.meshes.forget_intensities();
+        self.settled = None;
         Ok(true)
     }
 
@@ -149,9 +154,49 @@ impl Session {
         stop: &StopToken,
         layers: Option<&LayerCollector>,
     ) -> Result<(Image, RenderStats), RenderError> {
+        let settled = self.settled_for(settings);
         let (world, meshes) = self.split(settings);
-        let shown = Shown { camera, sink, stop, layers, purpose: Purpose::Image };
+        let shown = Shown { camera, sink, stop, settled, layers, purpose: Purpose::Image };
         render_world(world, shown, settings, meshes)
+    }
+
+    /// Chooses mesh points and estimator of averaged shadows, where settings leave them open and ask for an error, such that they are good enough for this
+    /// view and for all for which this was called before with the same settings. Later renders by these settings take that choice: their images are
+    /// alike, share their mesh points, and each still says how wrong it is.
+    ///
+    /// # Errors
+    /// See [`RenderError`]; then what was chosen before stays.
+    pub fn settle(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        stop: &StopToken,
+    ) -> Result<RenderStats, RenderError> {
+        settings.check()?;
+        camera.validate()?;
+        let before = self.settled_for(settings);
+        let (world, meshes) = self.split(settings);
+        let (sink, purpose) = (&(), Purpose::Meshes);
+        let view = View { world, camera, sink, stop, known: None, settled: None, layers: None, purpose };
+        let (settled, stats) = view.settle(&of_views(settings), before, meshes)?;
+        self.settled = settled.map(|settled| (of_views(settings), settled));
+        Ok(stats)
+    }
+
+    /// Lets every view choose for itself again what its settings leave open.
+    pub fn unsettle(&mut self) {
+        self.settled = None;
+    }
+
+    /// What was [chosen](Session::settle) for views by these settings.
+    fn settled_for(&self, settings: &Settings) -> Option<Settled> {
+        let (asked, settled) = self.settled.as_ref()?;
+        (*asked == of_views(settings)).then_some(*settled)
+    }
+
+    /// Whether a file that was [read](Session::read_light_meshes) knows what the settings leave open for a view.
+    pub fn knows_view(&self, camera: &Camera, settings: &Settings) -> bool {
+        self.meshes.known_view(camera, settings).is_some()
     }
 
     /// Makes known what a view needs of the light meshes, and what its settings leave open. Where nothing has to be measured, that takes no image.
@@ -165,8 +210,9 @@ impl Session {
         sink: &dyn TileSink,
         stop: &StopToken,
     ) -> Result<RenderStats, RenderError> {
+        let settled = self.settled_for(settings);
         let (world, meshes) = self.split(settings);
-        let shown = Shown { camera, sink, stop, layers: None, purpose: Purpose::Meshes };
+        let shown = Shown { camera, sink, stop, settled, layers: None, purpose: Purpose::Meshes };
         Ok(render_world(world, shown, settings, meshes)?.1)
     }
 
@@ -256,8 +302,9 @@ pub fn render(
     let mut meshes = LightMeshes::new(scene.bounds());
     let lights = lights.of_settings(settings);
     let world = World { accel: backend, scene, lights, emissive: &emissive };
+    let stop = StopToken::default();
     let shown =
-        Shown { camera, sink: &(), stop: &StopToken::default(), layers: None, purpose: Purpose::Image };
+        Shown { camera, sink: &(), stop: &stop, settled: None, layers: None, purpose: Purpose::Image };
     render_world(world, shown, settings, &mut meshes)
 }
 
@@ -266,6 +313,7 @@ struct Shown<'a> {
     camera: &'a Camera,
     sink: &'a dyn TileSink,
     stop: &'a StopToken,
+    settled: Option<Settled>,
     layers: Option<&'a LayerCollector>,
     purpose: Purpose,
 }
@@ -277,12 +325,12 @@ fn render_world<A: Accel>(
     meshes: &mut LightMeshes,
 ) -> Result<(Image, RenderStats), RenderError> {
     settings.check()?;
-    let Shown { camera, sink, stop, layers, purpose } = shown;
+    let Shown { camera, sink, stop, settled, layers, purpose } = shown;
     camera.validate()?;
     let known = meshes.known_view(camera, settings).cloned();
-    let settled = known.as_ref().map(|known| known.settled.settings(settings));
-    let view = View { world, camera, sink, stop, known: known.as_ref(), layers, purpose };
-    let (image, mut stats) = view.render(settled.as_ref().unwrap_or(settings), meshes)?;
+    let of_file = known.as_ref().map(|known| known.settled.settings(settings));
+    let view = View { world, camera, sink, stop, known: known.as_ref(), settled, layers, purpose };
+    let (image, mut stats) = view.render(of_file.as_ref().unwrap_or(settings), meshes)?;
     if let Some(known) = known {
         stats.accuracy = known.accuracy;
     }

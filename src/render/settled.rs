@@ -36,15 +36,30 @@ impl Settled {
         let mut settings = asked.clone();
         settings.limits.max_error = None;
         (settings.limits.steps, settings.limits.time) = (1, None);
-        let shading = &mut settings.shading;
-        (shading.integrator, shading.estimator) = (self.integrator, self.estimator);
-        shading.tolerance = self.tolerance;
+        settings.shading.integrator = self.integrator;
+        settings.shading.tolerance = self.tolerance;
+        self.choose_mesh(&mut settings);
+        settings
+    }
+
+    /// Puts mesh points, R and estimator into settings.
+    pub(super) fn choose_mesh(&self, settings: &mut Settings) {
+        settings.shading.estimator = self.estimator;
         if let Some(spacing) = self.spacing {
             settings.mesh.direct.spacing = Spacing::Units(spacing);
         }
         if let Some(radius) = self.radius {
-            shading.kernel.radius = Radius::Units(radius);
+            settings.shading.kernel.radius = Radius::Units(radius);
         }
-        settings
+    }
+
+    /// The spacing, if it does not follow from the view.
+    pub(super) fn spacing(&self) -> Option<Vec3> {
+        self.spacing
+    }
+
+    /// How direct light follows from the points.
+    pub(super) fn estimator(&self) -> Estimator {
+        self.estimator
     }
 }

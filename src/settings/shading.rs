@@ -44,6 +44,11 @@ impl ShadingSettings {
     pub fn direct_scale(&self) -> f32 {
         if self.lambertian { std::f32::consts::FRAC_1_PI } else { 1.0 }
     }
+
+    /// Whether a light mesh traces the edges of shadows: hybrid shadows (method §4).
+    pub fn is_hybrid(&self) -> bool {
+        self.resolve == Resolve::Trace && self.estimator == Estimator::PerLight
+    }
 }
 
 /// How indirect light at a surface point follows from the indirect mesh.

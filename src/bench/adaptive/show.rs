@@ -144,6 +144,7 @@ fn ended(ending: Ending) -> &'static str {
     match ending {
         Ending::Error => "error",
         Ending::Settings => "settings",
+        Ending::Settled => "mesh of several views",
         Ending::Finest => "finest mesh",
         Ending::Time => "time",
         Ending::Exact => "exact",

@@ -61,7 +61,12 @@ impl DirectEvaluation {
 impl DirectMesh {
     /// Mesh over a scene of the given bounds, with no point known.
     pub fn new(bounds: Bounds) -> Self {
-        Self { store: PointStore::new(PointSet::new(bounds)), field: DirectField::default() }
+        Self::shifted(bounds, Vec3::ZERO)
+    }
+
+    /// The same with all points but those of lists elsewhere, by a vector in spacings.
+    pub(crate) fn shifted(bounds: Bounds, shift: Vec3) -> Self {
+        Self { store: PointStore::new(PointSet::shifted(bounds, shift)), field: DirectField::default() }
     }
 
     /// How the mesh is interpolated by these settings; the layers of points that they name are added to the mesh. An automatic

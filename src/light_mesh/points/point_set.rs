@@ -57,13 +57,20 @@ struct Layer {
 /// Layers are added as settings need them and never change, so that ids stay valid whatever settings follow.
 pub struct PointSet {
     bounds: Bounds,
+    /// How far all points but those of lists lie from where they usually do, in spacings.
+    shift: Vec3,
     layers: Vec<Layer>,
 }
 
 impl PointSet {
     /// Without layers, for a scene of the given bounds.
     pub(crate) fn new(bounds: Bounds) -> Self {
-        Self { bounds, layers: Vec::new() }
+        Self::shifted(bounds, Vec3::ZERO)
+    }
+
+    /// The same with all points but those of lists elsewhere, by a vector in spacings.
+    pub(crate) fn shifted(bounds: Bounds, shift: Vec3) -> Self {
+        Self { bounds, shift, layers: Vec::new() }
     }
 
     /// Bounds of the scene.
@@ -104,7 +111,7 @@ impl PointSet {
         if number == MOST_LAYERS {
             return Err(MeshError::TooManySpacings);
         }
-        let anchor = anchor(self.bounds, spacing);
+        let anchor = anchor(self.bounds, spacing) + self.shift * spacing;
         let periodic = |layout, seed| Positions::Periodic(PeriodicPoints::new(anchor, spacing, layout, seed));
         let positions = match layout {
             PointLayout::List(positions) => Positions::List(PointList::new(positions)),

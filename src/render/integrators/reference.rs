@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-use crate::Bounds;
 use crate::accel::Accel;
 use crate::light_mesh::direct::{Basis, DirectField, FieldEstimator};
 use crate::light_mesh::leaks::{LeakGuard, PROBES, is_inside};
@@ -32,8 +31,6 @@ pub struct ReferenceIntegrator<'a, A> {
     neighbourhoods: Neighbourhoods,
     /// Points of the unit cube.
     sequence: Vec<Vec3>,
-    /// Points that take the sequence's place, if there are some.
-    points: Option<PointSet>,
 }
 
 /// Positions around one surface point at which the field is evaluated: by slot, with their weights.
@@ -64,42 +61,13 @@ impl<'a, A: Accel> ReferenceIntegrator<'a, A> {
         let neighbourhoods =
             Neighbourhoods::new(&mut points, &settings.mesh.direct, &shading.kernel, AutoSpacing::AVERAGED)?;
         let sequence = (0..shading.reference_samples).map(unit_cube_point).collect();
-        Ok(Self { world, shading, neighbourhoods, sequence, points: None })
-    }
-
-    /// What another light mesh would give whose points are as dense as those of the settings and lie elsewhere, by `shift` spacings.
-    ///
-    /// # Errors
-    /// As for a light mesh of the same settings.
-    pub(in crate::render) fn of_shifted_mesh(
-        world: World<'a, A>,
-        settings: &'a Settings,
-        shift: Vec3,
-    ) -> Result<Self, MeshError> {
-        let Settings { mesh, shading, .. } = settings;
-        let bounds = world.scene.bounds();
-        let mut points = PointSet::new(bounds);
-        let own = Neighbourhoods::new(&mut points, &mesh.direct, &shading.kernel, AutoSpacing::AVERAGED)?;
-        let shift = shift * own.spacing();
-        let mut points = PointSet::new(Bounds { min: bounds.min + shift, max: bounds.max + shift });
-        let neighbourhoods =
-            Neighbourhoods::new(&mut points, &mesh.direct, &shading.kernel, AutoSpacing::AVERAGED)?;
-        Ok(Self { world, shading, neighbourhoods, sequence: Vec::new(), points: Some(points) })
+        Ok(Self { world, shading, neighbourhoods, sequence })
     }
 
     /// Fills `samples` with positions evenly spread over D_y and their weights; returns whether D_y is so small that y
     /// itself has to stand for it.
     fn place(&self, surface: &SurfacePoint, samples: &mut Samples) -> bool {
         samples.clear();
-        if let Some(points) = &self.points {
-            let mut found = Neighbours::default();
-            let fallback = self.neighbourhoods.find(points, surface, &mut found);
-            for (&id, &weight) in found.ids().iter().zip(found.weights()) {
-                samples.push(points.position(id), weight);
-            }
-            samples.points.find_slots(|id| id as u32);
-            return fallback;
-        }
         // At infinite density the nearest mesh point is y itself.
         let nearest = self.shading.kernel.neighbourhood == Neighbourhood::Nearest;
         if !nearest {

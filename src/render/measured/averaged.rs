@@ -5,18 +5,17 @@ use glam::Vec3;
 use super::mean;
 use crate::accel::Accel;
 use crate::image::Image;
+use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
 use crate::render::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
 use crate::render::error::RenderError;
 use crate::render::fixed::View;
 use crate::render::held_out::{HeldOut, Pixels};
-use crate::render::integrators::{LightMeshIntegrator, ReferenceIntegrator};
+use crate::render::integrators::LightMeshIntegrator;
 use crate::render::meshes::{LightMeshes, MeshInterpolation};
 use crate::render::need::needed_points;
+use crate::render::settled::Settled;
 use crate::render::stats::{RenderStats, timed};
 use crate::settings::{Estimator, IndirectForm, Neighbourhood, PointLayout, Radius, Settings, Spacing};
-
-/// Where the points of the other mesh lie, in spacings: far from all points of a regular mesh and from the centres of its cells.
-const SHIFT: Vec3 = Vec3::new(0.27, 0.72, 0.23);
 
 /// Rays that measuring the error may take where shadows are averaged, as a share of the camera rays, since those of the mesh aren't known yet, and
 /// what is always spent, with which a frame of a tenth of a second says something about itself: they cost four times as much as camera rays.
@@ -55,7 +54,13 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
         let meant = settings.shading.estimator;
-        let mut open = self.open_spacing(&mut settings, meshes)?;
+        let mut open = match self.settled {
+            Some(settled) => {
+                settled.choose_mesh(&mut settings);
+                None
+            }
+            None => self.open_spacing(&mut settings, meshes)?,
+        };
         let mut before: Option<(Image, RenderStats)> = None;
         for pictures in 1.. {
             let mut trial = RenderStats::default();
@@ -84,6 +89,7 @@ impl<A: Accel> View<'_, A> {
             let ending = match (&mut open, missed) {
                 _ if is_late => Ending::Time,
                 (_, None) => Ending::Error,
+                (None, _) if self.settled.is_some() => Ending::Settled,
                 (None, _) => Ending::Settings,
                 (Some(open), Some(missed)) => {
                     open.refine(missed.error / asked);
@@ -99,6 +105,35 @@ impl<A: Accel> View<'_, A> {
             before = Some((image, stats));
         }
         Err(RenderError::Stopped)
+    }
+
+    /// Mesh points, R and estimator that are good enough for this view and for those that they were chosen for `before`, as far as settings leave them
+    /// open; `None` if they don't. What is evaluated for that is part of the mesh.
+    pub(in crate::render) fn settle(
+        &self,
+        settings: &Settings,
+        before: Option<Settled>,
+        meshes: &mut LightMeshes,
+    ) -> Result<(Option<Settled>, RenderStats), RenderError> {
+        let mut stats = RenderStats::default();
+        let mut settings = settings.clone();
+        let asked = settings.limits.max_error.unwrap_or(0.0);
+        if settings.shading.is_hybrid() || !self.is_measured(&settings, asked) {
+            return Ok((None, stats));
+        }
+        meshes.renew_lights(self.world.lights);
+        let mut seconds = 0.0;
+        let settled = timed(&mut seconds, || {
+            let mut open = self.open_spacing(&mut settings, meshes)?;
+            if let (Some(open), Some(before)) = (&mut open, before) {
+                open.begin_at(before.spacing());
+                settings.limits.estimator_open &= before.estimator() == Estimator::Directional;
+            }
+            self.choose_points(&mut settings, asked, &mut open, meshes, &mut stats)?;
+            Ok::<_, RenderError>(open.map(|_| Settled::of(settings.shading.integrator, &settings)))
+        })?;
+        stats.seconds.check += seconds;
+        Ok((settled, stats))
     }
 
     /// What is to be found of a spacing that the settings leave open: R is what it would be for the automatic spacing.
@@ -191,48 +226,47 @@ impl<A: Accel> View<'_, A> {
     ) -> Result<Errors, RenderError> {
         let mut as_meant = settings.clone();
         as_meant.shading.estimator = meant;
-        let (right, count) = self.shaded_by_mesh(&as_meant, held_out, meshes, stats)?;
-        let other = ReferenceIntegrator::of_shifted_mesh(self.world, &as_meant, SHIFT)?;
-        let (other, rays) = held_out.shaded(&other, 0..count);
+        let interpolation = meshes.interpolation(self.world.scene, self.camera, &as_meant)?;
+        let count = self.pixels_for(&interpolation, settings);
+        held_out.trace(&self.frame(settings), count.saturating_sub(held_out.paths.len()))?;
+        let right = self.shaded_by(&mut meshes.direct, &interpolation, held_out, count);
+        stats.add_direct(right.evaluation);
+        let elsewhere = meshes.other_interpolation(&as_meant)?;
+        let other = self.shaded_by(&mut meshes.other, &elsewhere, held_out, count);
+        let rays = other.rays();
         let errors = |shown: &Pixels, share: f32| {
-            held_out.errors(shown, &other, |difference| share * difference.length_squared())
+            held_out.errors(shown, &other.pixels, |difference| share * difference.length_squared())
         };
         if settings.shading.estimator == meant {
             let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
-            return Ok(Errors { parts: errors(&right, share), rays });
+            return Ok(Errors { parts: errors(&right.pixels, share), rays });
         }
         // Of another estimator, what it differs by from the other mesh, without what is that mesh's own error.
-        let own = errors(&right, 0.5);
-        let (shown, _) = self.shaded_by_mesh(settings, held_out, meshes, stats)?;
-        let mut parts = held_out.errors(&shown, &other, |difference| difference.length_squared());
+        let own = errors(&right.pixels, 0.5);
+        let interpolation = meshes.interpolation(self.world.scene, self.camera, settings)?;
+        let shown = self.shaded_by(&mut meshes.direct, &interpolation, held_out, count);
+        stats.add_direct(shown.evaluation);
+        let mut parts = errors(&shown.pixels, 1.0);
         parts.iter_mut().zip(&own).for_each(|(part, own)| part.wrong -= own.wrong);
         Ok(Errors { parts, rays })
     }
 
-    /// Direct light of held-out pixels by a mesh, as many of them as are held out for it, and their number.
-    fn shaded_by_mesh(
+    /// Direct light of the first `count` held-out pixels by a mesh.
+    fn shaded_by(
         &self,
-        settings: &Settings,
-        held_out: &mut HeldOut,
-        meshes: &mut LightMeshes,
-        stats: &mut RenderStats,
-    ) -> Result<(Pixels, usize), RenderError> {
+        mesh: &mut DirectMesh,
+        interpolation: &MeshInterpolation,
+        held_out: &HeldOut,
+        count: usize,
+    ) -> ShadedPixels {
         let world = self.world;
-        let interpolation = meshes.interpolation(world.scene, self.camera, settings)?;
-        let count = self.pixels_for(&interpolation, settings);
-        held_out.trace(&self.frame(settings), count.saturating_sub(held_out.paths.len()))?;
         let paths = held_out.paths.get(..count).unwrap_or(&held_out.paths);
-        let lookup = meshes.direct.view(world.lights, &interpolation.direct).lookup;
+        let lookup = mesh.view(world.lights, &interpolation.direct).lookup;
         let needed = needed_points(paths, lookup);
-        stats.add_direct(meshes.direct.evaluate(world, &interpolation.direct, &needed));
-        let direct = LightMeshIntegrator {
-            world,
-            direct: &mut meshes.direct,
-            indirect: None,
-            interpolation: &interpolation,
-        };
-        let (shown, _) = held_out.shaded(&direct, 0..count);
-        Ok((shown, count))
+        let evaluation = mesh.evaluate(world, &interpolation.direct, &needed);
+        let integrator = LightMeshIntegrator { world, direct: mesh, indirect: None, interpolation };
+        let (pixels, leak_rays) = held_out.shaded(&integrator, 0..count);
+        ShadedPixels { pixels, evaluation, leak_rays }
     }
 
     /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
@@ -242,6 +276,20 @@ impl<A: Accel> View<'_, A> {
         let per_pixel = interpolation.direct.neighbourhoods.points_around() * self.world.lights.len() as f32;
         let affordable = (MEASURED_BY_CAMERA * camera_rays).max(FEWEST_RAYS) / f64::from(per_pixel.max(1.0));
         (affordable as usize).clamp(PIXELS.0, PIXELS.1)
+    }
+}
+
+/// Held-out pixels by a mesh, and what they took.
+struct ShadedPixels {
+    pixels: Pixels,
+    evaluation: DirectEvaluation,
+    /// Rays by which surface points looked which mesh points they see.
+    leak_rays: u64,
+}
+
+impl ShadedPixels {
+    fn rays(&self) -> u64 {
+        self.evaluation.shadow + self.evaluation.inside + self.leak_rays
     }
 }
 
@@ -258,6 +306,13 @@ struct OpenSpacing {
 impl OpenSpacing {
     fn spacing(&self) -> Spacing {
         Spacing::Units(Vec3::splat(self.radius * (-(self.step as f32) / STEPS_PER_OCTAVE).exp2()))
+    }
+
+    /// Tries no coarser mesh than one of a spacing that was tried before.
+    fn begin_at(&mut self, spacing: Option<Vec3>) {
+        while self.step < FINEST && spacing.is_some_and(|spacing| self.spacing() != Spacing::Units(spacing)) {
+            self.step += 1;
+        }
     }
 
     /// Goes on to a mesh as fine as it probably has to be, so that few are tried, after one whose error was so many `times` too large.

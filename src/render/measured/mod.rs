@@ -10,7 +10,7 @@ use super::meshes::LightMeshes;
 use super::stats::RenderStats;
 use crate::accel::Accel;
 use crate::image::Image;
-use crate::settings::{Estimator, Integrator, Resolve, Settings};
+use crate::settings::{Estimator, Integrator, PointLayout, Settings};
 
 impl<A: Accel> View<'_, A> {
     /// Whether the error of a picture by these settings is measured.
@@ -18,7 +18,10 @@ impl<A: Accel> View<'_, A> {
         let shading = &settings.shading;
         let is_linear = matches!(shading.estimator, Estimator::PerLight | Estimator::Directional);
         let is_mesh = matches!(shading.integrator, Integrator::Auto | Integrator::LightMesh);
-        asked > 0.0 && !self.world.lights.is_empty() && is_linear && is_mesh
+        // There is no other mesh like a list of points.
+        let is_list = matches!(settings.mesh.direct.layout, PointLayout::List(_));
+        let has_measure = shading.is_hybrid() || !is_list;
+        asked > 0.0 && !self.world.lights.is_empty() && is_linear && is_mesh && has_measure
     }
 
     /// Renders with an error of at most `asked`, if it is above 0 and can be measured.
@@ -38,7 +41,7 @@ impl<A: Accel> View<'_, A> {
             }
             return Ok((image, stats));
         }
-        if shading.resolve == Resolve::Trace && shading.estimator == Estimator::PerLight {
+        if shading.is_hybrid() {
             self.render_traced(settings.clone(), asked, meshes)
         } else {
             self.render_averaged(settings.clone(), asked, meshes)
