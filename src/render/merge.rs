@@ -178,13 +178,21 @@ impl SampleMerger {
         order.clear();
     }
 
-    /// Whether samples of a pixel that were added since the last vertices see more than one surface, one of several colours, or the background
-    /// beside one; it has so many samples.
+    /// Keeps those of some pixels, each with its index last, of which samples that were added since the last vertices see more than one surface, one of
+    /// several colours, or the background beside one; each has so many samples.
     #[inline(always)]
-    pub fn is_mixed(&mut self, pixel: u32, samples: u32) -> bool {
+    pub fn keep_mixed(&mut self, pixels: &mut Vec<(u32, u32, u32)>, samples: u32) {
         self.group_all();
-        let last = self.last_of.get(pixel as usize).and_then(|&last| self.groups.get(last as usize));
-        last.is_some_and(|last| last.rank > 0 || last.is_mixed || last.count < samples)
+        let mut kept = 0;
+        for at in 0..pixels.len() {
+            let last =
+                self.last_of.get(pixels[at].2 as usize).and_then(|&last| self.groups.get(last as usize));
+            if last.is_some_and(|last| last.rank > 0 || last.is_mixed || last.count < samples) {
+                pixels[kept] = pixels[at];
+                kept += 1;
+            }
+        }
+        pixels.truncate(kept);
     }
 
     /// Finds the groups of samples that have none yet.

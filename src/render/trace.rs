@@ -11,7 +11,7 @@ use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene};
 use crate::settings::ViewSettings;
-use crate::simd::vectorize;
+use crate::simd::{each_lane, vectorize};
 use crate::world::World;
 
 /// A camera ray or reflection under way.
@@ -43,6 +43,22 @@ pub fn trace_paths<A: Accel>(
     } else {
         vectorize(TracePaths::<A, false> { world, camera, view, tile, paths });
     }
+}
+
+/// The lanes of a packet that hit what a lane hit: the same triangle, or nothing.
+#[inline(always)]
+fn on_triangle_of(packet: &RayHitPacket<WIDTH>, lane: usize) -> LaneMask {
+    let hits = &packet.hit;
+    let (geometry, instance) = (hits.geom_id[lane], hits.inst_id[lane]);
+    let nothing = geometry == INVALID_ID;
+    let triangle = hits.prim_id[lane];
+    let mut same = 0;
+    for other in 0..WIDTH {
+        let is_same = (hits.geom_id[other] == geometry)
+            & (nothing | ((hits.inst_id[other] == instance) & (hits.prim_id[other] == triangle)));
+        same |= LaneMask::from(is_same) << other;
+    }
+    same
 }
 
 /// The camera paths of a tile, as work for the best instruction set. What `LAYERS` need is kept by code of its own: in passing it took a sixth of the
@@ -96,7 +112,7 @@ fn trace_tile<A: Accel, const LAYERS: bool>(
         let first = (tracer.paths.vertices.len(), tracer.reflections.len());
         tracer.trace_square(camera, &square, 0..samples);
         if more > 0 {
-            square.retain(|&(_, _, pixel)| tracer.merger.is_mixed(pixel, samples));
+            tracer.merger.keep_mixed(&mut square, samples);
             tracer.trace_square(camera, &square, samples..samples + more);
             tracer.paths.camera_rays += square.len() as u64 * u64::from(more);
         }
@@ -173,13 +189,18 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         (ray.tnear, ray.tfar) = ([0.0; WIDTH], [f32::INFINITY; WIDTH]);
         (hit.geom_id, hit.inst_id) = ([INVALID_ID; WIDTH], [INVALID_ID; WIDTH]);
         self.accel.intersect_packet(ALL, &mut packet, Coherence::Coherent);
-        if self.arrive_together(pixel, &packet) {
-            return;
-        }
-        for lane in 0..WIDTH {
-            let direction = Vec3::new(dir_x[lane], dir_y[lane], dir_z[lane]);
-            let pending = Pending { ray: Ray::new(origin, direction), weight: Vec3::ONE, pixel };
-            self.arrive(&pending, hit_of_lane(&packet, lane), 1);
+        let mut left = ALL;
+        while left != 0 {
+            let lanes = left & on_triangle_of(&packet, left.trailing_zeros() as usize);
+            left &= !lanes;
+            if self.arrive_together(pixel, &packet, lanes) {
+                continue;
+            }
+            for lane in each_lane(lanes) {
+                let direction = Vec3::new(dir_x[lane], dir_y[lane], dir_z[lane]);
+                let pending = Pending { ray: Ray::new(origin, direction), weight: Vec3::ONE, pixel };
+                self.arrive(&pending, hit_of_lane(&packet, lane), 1);
+            }
         }
     }
 
@@ -221,20 +242,14 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         }
     }
 
-    /// Takes up what sixteen samples of a pixel found if they hit one triangle, which is no mirror: most do. Returns whether it did.
+    /// Takes up what those samples of a pixel found that hit one triangle, which is no mirror: mostly they are all. Returns whether it did.
     #[inline(always)]
-    fn arrive_together(&mut self, pixel: u32, packet: &RayHitPacket<WIDTH>) -> bool {
-        let RayHitPacket { ray, hit } = packet;
-        let mut differ = 0;
-        for lane in 0..WIDTH {
-            differ |= hit.geom_id[lane] ^ hit.geom_id[0];
-            differ |= hit.inst_id[lane] ^ hit.inst_id[0];
-            differ |= hit.prim_id[lane] ^ hit.prim_id[0];
-        }
-        let direction = Vec3::new(ray.dir_x[0], ray.dir_y[0], ray.dir_z[0]);
-        let Some(hit) = hit_of_lane(packet, 0).filter(|_| differ == 0) else { return false };
-        let (u, v) = (&packet.hit.u, &packet.hit.v);
-        let (seen, positions) = self.scene.interaction_of_all(&hit, u, v, direction);
+    fn arrive_together(&mut self, pixel: u32, packet: &RayHitPacket<WIDTH>, lanes: LaneMask) -> bool {
+        let RayHitPacket { ray, hit: hits } = packet;
+        let first = lanes.trailing_zeros() as usize;
+        let Some(hit) = hit_of_lane(packet, first).filter(|_| lanes & (lanes - 1) != 0) else { return false };
+        let direction = Vec3::new(ray.dir_x[first], ray.dir_y[first], ray.dir_z[first]);
+        let (seen, positions) = self.scene.interaction_of_lanes(&hit, lanes, &hits.u, &hits.v, direction);
         if seen.culled || self.is_mirrored(seen.specular, 1) {
             return false;
         }
@@ -242,7 +257,7 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         let mut farthest = 0.0f32;
         for lane in 0..WIDTH {
             let [x, y, z] = [0, 1, 2].map(|axis| positions[axis][lane] - surface.position[axis]);
-            let distance = x * x + y * y + z * z;
+            let distance = if lanes >> lane & 1 == 1 { x * x + y * y + z * z } else { 0.0 };
             farthest = if distance > farthest { distance } else { farthest };
         }
         if !self.merger.is_narrow(&surface, farthest.sqrt()) {
@@ -250,8 +265,8 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         }
         let above = surface.geometric_normal * surface.offset;
         let [x, y, z] = positions;
-        let origins = (0..WIDTH).map(|lane| Vec3::new(x[lane], y[lane], z[lane]) + above);
-        let samples = WIDTH as u32;
+        let origins = each_lane(lanes).map(|lane| Vec3::new(x[lane], y[lane], z[lane]) + above);
+        let samples = lanes.count_ones();
         let reflectance = seen.diffuse * samples as f32;
         let emission = seen.emission * samples as f32;
         self.paths.radiance[pixel as usize] += emission;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ray::Hit;
 use super::scene::Scene;
 use super::texture::TextureMap;
-use crate::simd::{LANES, Lanes, horizontal_sum};
+use crate::simd::{LANES, Lanes, each_lane, horizontal_sum};
 
 /// A visible surface point y (docs/method.md §1).
 ///
@@ -81,23 +81,31 @@ impl Scene {
         })
     }
 
-    /// The same in the middle of sixteen hits on one triangle, with the mean of what textures have at each of them; and where the
+    /// The same in the middle of several hits on one triangle, with the mean of what textures have at each of them; and where the
     /// hits lie, by axis.
     ///
-    /// `hit` names the triangle; the barycentric coordinates are those of the sixteen.
+    /// `hit` names the triangle; `lanes` are those of the barycentric coordinates that are of hits on it, at least one.
     #[inline(always)]
-    pub fn interaction_of_all(
+    pub fn interaction_of_lanes(
         &self,
         hit: &Hit,
+        lanes: u32,
         u: &Lanes,
         v: &Lanes,
         direction: Vec3,
     ) -> (Interaction, [Lanes; 3]) {
-        let part = 1.0 / LANES as f32;
-        let middle = Hit { u: horizontal_sum(u) * part, v: horizontal_sum(v) * part, ..*hit };
+        let part = 1.0 / lanes.count_ones() as f32;
+        let mean = |values: &Lanes| {
+            let mut counting = *values;
+            for lane in 0..LANES {
+                counting[lane] = if lanes >> lane & 1 == 1 { counting[lane] } else { 0.0 };
+            }
+            horizontal_sum(&counting) * part
+        };
+        let middle = Hit { u: mean(u), v: mean(v), ..*hit };
         let interaction = self.interaction_with(&middle, direction, |map, [a, b, c]| {
             let at = |lane: usize| a * (1.0 - u[lane] - v[lane]) + b * u[lane] + c * v[lane];
-            (0..LANES).map(|lane| map.sample(at(lane)).0).sum::<Vec3>() * part
+            each_lane(lanes).map(|lane| map.sample(at(lane)).0).sum::<Vec3>() * part
         });
         let instance = &self.instances[hit.instance as usize];
         let corners = self.meshes[instance.mesh as usize].corners(hit.triangle);

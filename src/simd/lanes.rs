@@ -8,6 +8,29 @@ pub const LANES: usize = 16;
 /// One value per lane.
 pub type Lanes = [f32; LANES];
 
+/// The lanes of a mask, in ascending order.
+#[inline(always)]
+pub fn each_lane(mask: u32) -> EachLane {
+    EachLane(mask)
+}
+
+/// See [`each_lane`].
+#[derive(Clone)]
+pub struct EachLane(u32);
+
+impl Iterator for EachLane {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        (self.0 != 0).then(|| {
+            let lane = self.0.trailing_zeros() as usize % LANES;
+            self.0 &= self.0 - 1;
+            lane
+        })
+    }
+}
+
 /// Sum of all lanes, always in the same order.
 #[inline(always)]
 pub fn horizontal_sum(lanes: &Lanes) -> f32 {

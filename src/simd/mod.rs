@@ -8,7 +8,7 @@
 mod lanes;
 
 pub use lanes::LANES;
-pub(crate) use lanes::{Lanes, horizontal_extremes, horizontal_sum, horizontal_sums};
+pub(crate) use lanes::{Lanes, each_lane, horizontal_extremes, horizontal_sum, horizontal_sums};
 
 use pulp::NullaryFnOnce;
 
