@@ -5,7 +5,8 @@ use std::time::Duration;
 use glam::Vec3;
 use lightmesh::image::Image;
 use lightmesh::image::metrics::{MetricsOptions, compare};
-use lightmesh::render::{Ending, Measure, RenderStats, StopToken, Tile, TileSink};
+use lightmesh::render::{Ending, Measure, RenderStats, Session, StopToken, Tile, TileSink};
+use lightmesh::scene::Camera;
 use lightmesh::scene::load::LoadedScene;
 use lightmesh::settings::{Integrator, Leaks, Limits, Neighbourhood, Radius, Resolve, Settings, Spacing};
 use std::sync::Mutex;
@@ -60,6 +61,34 @@ fn the_error_that_is_said_is_the_true_one() {
         assert!(found.confidence < 0.8 * found.error, "spacing {spacing}: {found:?} says nothing");
         assert_eq!((accuracy.ending, found.measure), (Ending::Settings, Measure::Rmse));
     }
+}
+
+/// Views that settle together have images of their own, whichever of them are rendered and in which order; who settles no longer is alone again.
+#[test]
+fn views_that_settle_together_do_not_depend_on_each_other() {
+    let scene = scene();
+    let settings = settings(0.05);
+    let far = scene.cameras[0].clone();
+    let near = Camera { position: far.position.lerp(far.look_at, 0.6), ..far.clone() };
+    let image = |session: &mut Session, camera: &Camera| {
+        let (image, stats) = session.render(camera, &settings).expect("an image");
+        let accuracy = stats.accuracy.expect("measured");
+        assert!(matches!(accuracy.ending, Ending::Error | Ending::Settled), "{accuracy:?}");
+        bits(&image)
+    };
+    let settled = || {
+        let mut session = session(&scene.scene);
+        let never = StopToken::default();
+        [&far, &near].map(|camera| session.settle(camera, &settings, &never).expect("something to choose"));
+        session
+    };
+    let mut both = settled();
+    let together = [&far, &near].map(|camera| image(&mut both, camera));
+    assert!(image(&mut settled(), &near) == together[1] && image(&mut settled(), &far) == together[0]);
+    let alone = [&far, &near].map(|camera| image(&mut session(&scene.scene), camera));
+    assert!(alone != together, "one of the views needs another mesh than both together");
+    both.unsettle();
+    assert!([&far, &near].map(|camera| image(&mut both, camera)) == alone);
 }
 
 /// Whoever asks for less error gets it, for more rays, with the same R: all pictures are of the same softness, that of a render without a limit.

@@ -73,12 +73,12 @@ fn image(session: &mut Session, settings: &Settings) -> (Vec<u32>, u64) {
 
 /// Goes through some frames, and compares each to that of a new session; returns what the moves kept, and the rays of the session and of
 /// the new ones.
-fn walk(scene: &Scene, choice: BackendChoice, settings: &Settings) -> (Vec<Moved>, u64, u64) {
+fn walk(scene: &Scene, choice: BackendChoice, settings: &Settings, frames: i64) -> (Vec<Moved>, u64, u64) {
     let mut session = Session::new(scene.clone(), choice).expect("a sound scene");
     image(&mut session, settings);
     let mut moved_scene = scene.clone();
     let (mut moves, mut rays, mut new_rays) = (Vec::new(), 0, 0);
-    for number in 0..6 {
+    for number in 0..frames {
         let frame = frame(number, scene);
         frame.apply(&mut moved_scene);
         moves.push(session.move_to(&frame).expect("the parts are there"));
@@ -115,7 +115,7 @@ fn frames_are_those_of_new_sessions() {
         for (number, change) in changes.iter().enumerate() {
             let mut settings = settings();
             change(&mut settings);
-            let (moves, rays, new_rays) = walk(&scene, choice, &settings);
+            let (moves, rays, new_rays) = walk(&scene, choice, &settings, 6);
             for moved in &moves {
                 assert!(moved.instances > 0 && moved.lights <= 1, "{moved:?}");
                 let known = moved.known;
@@ -131,7 +131,7 @@ fn frames_are_those_of_new_sessions() {
 fn lamps_with_a_shape_may_move() {
     let mut settings = settings();
     settings.shading.lambertian = true;
-    walk(&room(true), BackendChoice::Bvh, &settings);
+    walk(&room(true), BackendChoice::Bvh, &settings, 6);
 }
 
 /// Light from surfaces, and points that build on coarser ones, are found anew.
@@ -140,7 +140,7 @@ fn what_builds_on_other_values_is_forgotten() {
     let scene = room(false);
     let mut with_levels = settings();
     with_levels.mesh.direct.levels = 2;
-    let (moves, ..) = walk(&scene, BackendChoice::Bvh, &with_levels);
+    let (moves, ..) = walk(&scene, BackendChoice::Bvh, &with_levels, 6);
     assert!(moves.iter().all(|moved| moved.known.bits_kept == 0 && moved.known.points_kept == 0));
     let mut with_surface = settings();
     with_surface.shading.lambertian = true;
@@ -150,7 +150,7 @@ fn what_builds_on_other_values_is_forgotten() {
         bounces: 2,
         ..IndirectSettings::default()
     });
-    walk(&scene, BackendChoice::Bvh, &with_surface);
+    walk(&scene, BackendChoice::Bvh, &with_surface, 2);
 }
 
 /// A camera that moves alone forgets nothing; nor does a frame that has everything where it is.

@@ -39,6 +39,7 @@ fn folder() -> TempDir {
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("writable");
     write("scene.toml", SCENE);
     write("still.toml", &SCENE.replace("keyframes =", "#").replace("turntable =", "#"));
+    write("open.toml", &SCENE.replace("max_error = 0", "max_error = 0.05").replace("spacing = 0.4", ""));
     write("floor.obj", "v -3 0 -3\nv -3 0 3\nv 3 0 3\nv 3 0 -3\nf 1 2 3 4\n");
     write("triangle.obj", "v -0.3 0 0\nv 0.3 0 0\nv 0 0 -0.5\nf 1 2 3\n");
     folder
@@ -84,6 +85,21 @@ fn frames_are_what_they_are_alone() {
     }
     let bytes = |name: &str| fs::read(folder.join(name)).expect("an image");
     assert_ne!(bytes("f.00.exr"), bytes("f.01.exr"), "something moves");
+}
+
+/// What settings leave open is chosen by frames all over the animation, whichever of them are rendered: each is what it is alone, and says how wrong it is.
+#[test]
+fn one_mesh_serves_all_frames() {
+    let folder = folder();
+    let folder = folder.path();
+    let said = lines(&render(folder, "open.toml", &["--frames", "2,5", "-o", "f.#.exr", "--float"]));
+    assert!(said.contains("one light mesh for all frames, chosen by frames 0, 2, 4, 6 "), "{said}");
+    assert_eq!(said.matches("pixels held out").count(), 2, "{said}");
+    for number in ["5", "2"] {
+        lines(&render(folder, "open.toml", &["--frames", number, "-o", "alone.exr", "--float"]));
+        let read = |name: &str| fs::read(folder.join(name)).expect("an image");
+        assert!(read(&format!("f.{number}.exr")) == read("alone.exr"), "frame {number}");
+    }
 }
 
 /// Without `--frames` what moves stands still, and a name is a name.
@@ -134,5 +150,5 @@ fn mistakes_are_told_at_once() {
         assert_eq!(output.status.code(), Some(code), "{flags:?}: {said}");
         assert!(said.contains(problem), "{flags:?}: {said}");
     }
-    assert!(fs::read_dir(folder.path()).expect("the folder").count() == 4, "nothing was written");
+    assert!(fs::read_dir(folder.path()).expect("the folder").count() == 5, "nothing was written");
 }
