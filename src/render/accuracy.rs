@@ -162,7 +162,16 @@ impl ErrorEstimate {
 
     /// Whether the error is at most `limit`, with 95 % confidence: what is below the interval's lower end doesn't speak against that.
     pub(super) fn is_within(&self, limit: f32) -> bool {
-        f64::from(self.error) + f64::from(self.confidence) * CONFIDENT_BELOW / CONFIDENT <= f64::from(limit)
+        f64::from(self.error) + self.one_sided() <= f64::from(limit)
+    }
+
+    /// Whether the error is more than `limit`, with 95 % confidence.
+    pub(super) fn is_above(&self, limit: f32) -> bool {
+        f64::from(self.error) - self.one_sided() > f64::from(limit)
+    }
+
+    fn one_sided(&self) -> f64 {
+        f64::from(self.confidence) * CONFIDENT_BELOW / CONFIDENT
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::settings::{Estimator, Integrator, Radius, Settings, Spacing};
+use crate::settings::{Estimator, Integrator, LayoutName, PointLayout, Radius, Settings, Spacing};
 
 /// The settings that a render may choose by itself, as one of its pictures has them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -11,6 +11,8 @@ pub struct Settled {
     integrator: Integrator,
     estimator: Estimator,
     tolerance: f32,
+    /// `None` for one that is not chosen among others.
+    layout: Option<LayoutName>,
     /// `None` where it follows from the view.
     spacing: Option<Vec3>,
     radius: Option<f32>,
@@ -28,7 +30,13 @@ impl Settled {
             Radius::Units(radius) => Some(radius),
             Radius::Spacings(_) => None,
         };
-        Self { integrator, estimator: shading.estimator, tolerance: shading.tolerance, spacing, radius }
+        let layout = match settings.mesh.direct.layout {
+            PointLayout::Regular => Some(LayoutName::Regular),
+            PointLayout::BodyCentred => Some(LayoutName::BodyCentred),
+            _ => None,
+        };
+        let (estimator, tolerance) = (shading.estimator, shading.tolerance);
+        Self { integrator, estimator, tolerance, layout, spacing, radius }
     }
 
     /// The settings of that picture, given those that left it open: nothing is measured any more.
@@ -45,17 +53,15 @@ impl Settled {
     /// Puts mesh points, R and estimator into settings.
     pub(super) fn choose_mesh(&self, settings: &mut Settings) {
         settings.shading.estimator = self.estimator;
+        if let Some(layout) = self.layout {
+            settings.mesh.direct.layout = PointLayout::of_name(layout, 0);
+        }
         if let Some(spacing) = self.spacing {
             settings.mesh.direct.spacing = Spacing::Units(spacing);
         }
         if let Some(radius) = self.radius {
             settings.shading.kernel.radius = Radius::Units(radius);
         }
-    }
-
-    /// The spacing, if it does not follow from the view.
-    pub(super) fn spacing(&self) -> Option<Vec3> {
-        self.spacing
     }
 
     /// How direct light follows from the points.

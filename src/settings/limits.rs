@@ -10,6 +10,8 @@ pub struct Limits {
     pub max_error: Option<f32>,
     /// Whether `directional` may take the place of `per-light` where lights are many and the error allows it.
     pub estimator_open: bool,
+    /// Whether a body-centred mesh may take the place of a regular one where it is to be coarse.
+    pub layout_open: bool,
     /// Time after which no further step is taken and the last one ends, with the best whole picture so far.
     pub time: Option<Duration>,
     /// Whole pictures that are made one after the other, each better than the one before, at least 1.
@@ -26,6 +28,6 @@ impl Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { max_error: None, estimator_open: false, time: None, steps: 1 }
+        Self { max_error: None, estimator_open: false, layout_open: false, time: None, steps: 1 }
     }
 }

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use super::error::MeshFileError;
 
 /// The version of the format that is written, and the only one that is read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// First bytes. Like PNG's they show whether a transfer has changed line ends or lost the eighth bit.
 const MAGIC: [u8; 8] = *b"\x89lmesh\r\n";

@@ -15,7 +15,9 @@ use crate::render::meshes::{LightMeshes, MeshInterpolation};
 use crate::render::need::needed_points;
 use crate::render::settled::Settled;
 use crate::render::stats::{RenderStats, timed};
-use crate::settings::{Estimator, IndirectForm, Neighbourhood, PointLayout, Radius, Settings, Spacing};
+use crate::settings::{
+    Estimator, IndirectForm, Neighbourhood, PointLayout, PointSettings, Radius, Settings, Spacing,
+};
 
 /// Rays that measuring the error may take where shadows are averaged, as a share of the camera rays, since those of the mesh aren't known yet, and
 /// what is always spent, with which a frame of a tenth of a second says something about itself: they cost four times as much as camera rays.
@@ -25,11 +27,20 @@ const FEWEST_RAYS: f64 = 5e4;
 /// Pixels that are held out at least, and at most.
 const PIXELS: (usize, usize) = (96, 2048);
 
+/// How often they are doubled where they leave it open whether a mesh is good enough.
+const DOUBLINGS: u32 = 2;
+
 /// Spacings that are tried are R times powers of 2, this many to an octave, down to R/4: already there a surface point has some 130 points to weigh, which
 /// takes longer than conventional tracing unless lights are many, and memory for the points grows eightfold with each further octave. Who wants a finer
 /// mesh than that can name its spacing.
+///
+/// With few points in D_y a regular grid is wrong by a fifth where it happens to lie badly; a body-centred one of as many points is not, and from a spacing of R/1.26 on
+/// both are wrong by the same. So the coarsest meshes are body-centred, unless settings name a layout.
 const STEPS_PER_OCTAVE: f32 = 3.0;
-const FINEST: u32 = 6;
+const FINEST: i32 = 6;
+const COARSEST_REGULAR: i32 = 0;
+const FINEST_BODY_CENTRED: i32 = 0;
+const COARSEST_BODY_CENTRED: i32 = -1;
 
 /// The error falls with about this power of the spacing, by what `lightmesh bench` finds on the forest; the first guess leaves some room for the
 /// uncertainty of what is measured.
@@ -59,7 +70,7 @@ impl<A: Accel> View<'_, A> {
                 settled.choose_mesh(&mut settings);
                 None
             }
-            None => self.open_spacing(&mut settings, meshes)?,
+            None => self.open_points(&mut settings, meshes)?,
         };
         let mut before: Option<(Image, RenderStats)> = None;
         for pictures in 1.. {
@@ -74,10 +85,9 @@ impl<A: Accel> View<'_, A> {
                 rendered => rendered,
             };
             let found = timed(&mut seconds, || {
-                let count = self
-                    .pixels_for(&meshes.interpolation(self.world.scene, self.camera, &settings)?, &settings);
+                let count = self.pixels_for(&settings, meshes)?;
                 let mut held_out = HeldOut::by_brightness(&self.frame(&settings), &image, count)?;
-                let errors = self.errors_of(&settings, meant, &mut held_out, meshes, &mut trial)?;
+                let errors = self.errors_of(&settings, meant, (&mut held_out, count), meshes, &mut trial)?;
                 Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
             });
             let (found, is_late) = self.or_unmeasured(found)?;
@@ -98,7 +108,7 @@ impl<A: Accel> View<'_, A> {
             };
             let rays_for_half = Some(POINTS_FOR_HALF * stats.rays.shadow);
             stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
-            let is_last = pictures >= MOST_PICTURES || open.as_ref().is_none_or(|open| open.step > FINEST);
+            let is_last = pictures >= MOST_PICTURES || open.as_ref().is_none_or(OpenPoints::is_over);
             if ending != Ending::Finest || is_last {
                 return Ok((image, stats));
             }
@@ -124,9 +134,9 @@ impl<A: Accel> View<'_, A> {
         meshes.renew_lights(self.world.lights);
         let mut seconds = 0.0;
         let settled = timed(&mut seconds, || {
-            let mut open = self.open_spacing(&mut settings, meshes)?;
+            let mut open = self.open_points(&mut settings, meshes)?;
             if let (Some(open), Some(before)) = (&mut open, before) {
-                open.begin_at(before.spacing());
+                open.begin_at(&before, &settings);
                 settings.limits.estimator_open &= before.estimator() == Estimator::Directional;
             }
             self.choose_points(&mut settings, asked, &mut open, meshes, &mut stats)?;
@@ -136,12 +146,12 @@ impl<A: Accel> View<'_, A> {
         Ok((settled, stats))
     }
 
-    /// What is to be found of a spacing that the settings leave open: R is what it would be for the automatic spacing.
-    fn open_spacing(
+    /// What is to be found of mesh points that the settings leave open: R is what it would be for the automatic spacing.
+    fn open_points(
         &self,
         settings: &mut Settings,
         meshes: &mut LightMeshes,
-    ) -> Result<Option<OpenSpacing>, RenderError> {
+    ) -> Result<Option<OpenPoints>, RenderError> {
         let points = &settings.mesh.direct;
         let by_direct = |form| form == IndirectForm::Scalar;
         let is_open = points.spacing == Spacing::Auto
@@ -152,37 +162,51 @@ impl<A: Accel> View<'_, A> {
         if !is_open {
             return Ok(None);
         }
+        let body_centred = settings.limits.layout_open && points.levels == 0;
         let radius =
             meshes.interpolation(self.world.scene, self.camera, settings)?.direct.neighbourhoods.radius();
         settings.shading.kernel.radius = Radius::Units(radius);
         let held_out = HeldOut::new(&self.frame(settings), 1, PIXELS.1);
-        Ok(Some(OpenSpacing { radius, step: 0, held_out }))
+        let step = if body_centred { COARSEST_BODY_CENTRED } else { COARSEST_REGULAR };
+        Ok(Some(OpenPoints { radius, body_centred, step, held_out }))
     }
 
-    /// Puts the coarsest points into the settings whose error at pixels all over the picture is within the limit, if their spacing is open. What is
+    /// Puts the coarsest points into the settings whose error at pixels all over the picture is within the limit, if they are open. What is
     /// evaluated for that is part of the mesh.
     fn choose_points(
         &self,
         settings: &mut Settings,
         asked: f32,
-        open: &mut Option<OpenSpacing>,
+        open: &mut Option<OpenPoints>,
         meshes: &mut LightMeshes,
         stats: &mut RenderStats,
     ) -> Result<(), RenderError> {
         let Some(open) = open else { return Ok(()) };
-        while open.step <= FINEST {
-            let before = std::mem::replace(&mut settings.mesh.direct.spacing, open.spacing());
+        let (mut is_first, mut doublings) = (true, 0);
+        while !open.is_over() {
+            let points = open.points(&settings.mesh.direct);
+            let before = std::mem::replace(&mut settings.mesh.direct, points);
             let meant = settings.shading.estimator;
-            let errors = match self.errors_of(settings, meant, &mut open.held_out, meshes, stats) {
-                Err(RenderError::Mesh(_)) if open.step > 0 => {
-                    settings.mesh.direct.spacing = before;
+            let errors = self.pixels_for(settings, meshes).map(|count| (count << doublings).min(PIXELS.1));
+            let errors = errors.and_then(|count| {
+                self.errors_of(settings, meant, (&mut open.held_out, count), meshes, stats)
+            });
+            let errors = match errors {
+                Err(RenderError::Mesh(_)) if !is_first => {
+                    settings.mesh.direct = before;
                     open.step = FINEST;
                     return Ok(());
                 }
                 errors => errors?,
             };
+            is_first = false;
             match errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) {
-                Some(estimate) => open.refine(estimate.error / asked),
+                // More pixels cost less than a finer mesh that isn't needed.
+                Some(estimate) if doublings < DOUBLINGS && !estimate.is_above(asked) => doublings += 1,
+                Some(estimate) => {
+                    doublings = 0;
+                    open.refine(estimate.error / asked);
+                }
                 None => return self.choose_estimator(settings, asked, open, meshes, stats),
             }
         }
@@ -194,7 +218,7 @@ impl<A: Accel> View<'_, A> {
         &self,
         settings: &mut Settings,
         asked: f32,
-        open: &mut OpenSpacing,
+        open: &mut OpenPoints,
         meshes: &mut LightMeshes,
         stats: &mut RenderStats,
     ) -> Result<(), RenderError> {
@@ -202,7 +226,8 @@ impl<A: Accel> View<'_, A> {
         let may = settings.limits.estimator_open && meant == Estimator::PerLight;
         if may && self.world.lights.len() >= MANY_LIGHTS {
             settings.shading.estimator = Estimator::Directional;
-            let errors = self.errors_of(settings, meant, &mut open.held_out, meshes, stats)?;
+            let count = self.pixels_for(settings, meshes)?;
+            let errors = self.errors_of(settings, meant, (&mut open.held_out, count), meshes, stats)?;
             if errors.estimate(None).is_some_and(|estimate| !estimate.is_within(asked)) {
                 settings.shading.estimator = meant;
             }
@@ -220,14 +245,13 @@ impl<A: Accel> View<'_, A> {
         &self,
         settings: &Settings,
         meant: Estimator,
-        held_out: &mut HeldOut,
+        (held_out, count): (&mut HeldOut, usize),
         meshes: &mut LightMeshes,
         stats: &mut RenderStats,
     ) -> Result<Errors, RenderError> {
         let mut as_meant = settings.clone();
         as_meant.shading.estimator = meant;
         let interpolation = meshes.interpolation(self.world.scene, self.camera, &as_meant)?;
-        let count = self.pixels_for(&interpolation, settings);
         held_out.trace(&self.frame(settings), count.saturating_sub(held_out.paths.len()))?;
         let right = self.shaded_by(&mut meshes.direct, &interpolation, held_out, count);
         stats.add_direct(right.evaluation);
@@ -270,12 +294,13 @@ impl<A: Accel> View<'_, A> {
     }
 
     /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
-    fn pixels_for(&self, interpolation: &MeshInterpolation, settings: &Settings) -> usize {
+    fn pixels_for(&self, settings: &Settings, meshes: &mut LightMeshes) -> Result<usize, RenderError> {
+        let interpolation = meshes.interpolation(self.world.scene, self.camera, settings)?;
         let (width, height) = settings.view.resolution;
         let camera_rays = f64::from(width) * f64::from(height) * f64::from(settings.view.samples_per_pixel);
         let per_pixel = interpolation.direct.neighbourhoods.points_around() * self.world.lights.len() as f32;
         let affordable = (MEASURED_BY_CAMERA * camera_rays).max(FEWEST_RAYS) / f64::from(per_pixel.max(1.0));
-        (affordable as usize).clamp(PIXELS.0, PIXELS.1)
+        Ok((affordable as usize).clamp(PIXELS.0, PIXELS.1))
     }
 }
 
@@ -293,24 +318,41 @@ impl ShadedPixels {
     }
 }
 
-/// A spacing that is to be found.
-struct OpenSpacing {
+/// Mesh points that are to be found.
+struct OpenPoints {
     /// R.
     radius: f32,
-    /// What is tried next, see [`OpenSpacing::spacing`].
-    step: u32,
+    /// Whether coarse ones are body-centred.
+    body_centred: bool,
+    /// What is tried next, see [`OpenPoints::points`].
+    step: i32,
     /// Pixels at which it is tried.
     held_out: HeldOut,
 }
 
-impl OpenSpacing {
-    fn spacing(&self) -> Spacing {
-        Spacing::Units(Vec3::splat(self.radius * (-(self.step as f32) / STEPS_PER_OCTAVE).exp2()))
+impl OpenPoints {
+    /// The points of settings as they are tried: those of a step are twice as many as those of the step before.
+    fn points(&self, settings: &PointSettings) -> PointSettings {
+        // A body-centred mesh has two points per cell.
+        let (layout, octaves) = if self.body_centred && self.step <= FINEST_BODY_CENTRED {
+            (PointLayout::BodyCentred, 1 - self.step)
+        } else {
+            (PointLayout::Regular, -self.step)
+        };
+        let spacing = self.radius * (octaves as f32 / STEPS_PER_OCTAVE).exp2();
+        PointSettings { layout, spacing: Spacing::Units(Vec3::splat(spacing)), ..settings.clone() }
     }
 
-    /// Tries no coarser mesh than one of a spacing that was tried before.
-    fn begin_at(&mut self, spacing: Option<Vec3>) {
-        while self.step < FINEST && spacing.is_some_and(|spacing| self.spacing() != Spacing::Units(spacing)) {
+    /// Whether all that is tried was.
+    fn is_over(&self) -> bool {
+        self.step > FINEST
+    }
+
+    /// Tries no coarser mesh than that of a choice that was made before.
+    fn begin_at(&mut self, before: &Settled, settings: &Settings) {
+        let mut wanted = settings.clone();
+        before.choose_mesh(&mut wanted);
+        while self.step < FINEST && self.points(&settings.mesh.direct) != wanted.mesh.direct {
             self.step += 1;
         }
     }
@@ -318,7 +360,7 @@ impl OpenSpacing {
     /// Goes on to a mesh as fine as it probably has to be, so that few are tried, after one whose error was so many `times` too large.
     fn refine(&mut self, times: f32) {
         let octaves = (HEADROOM * times).log2() / ORDER;
-        let next = self.step.saturating_add(((octaves * STEPS_PER_OCTAVE).round() as u32).max(1));
+        let next = self.step.saturating_add(((octaves * STEPS_PER_OCTAVE).round() as i32).max(1));
         // The finest one is tried, unless it was.
         self.step = if self.step < FINEST { next.min(FINEST) } else { next };
     }

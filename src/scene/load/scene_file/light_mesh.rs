@@ -47,6 +47,7 @@ impl LightMeshTable {
         self.point_keys("light_mesh").apply(&mut mesh.direct, &mut shading.kernel, folder, places)?;
         mesh.direct.levels = self.levels.map_or(mesh.direct.levels, |count| count.0);
         limits.estimator_open = self.estimator.is_none();
+        limits.layout_open = self.layout.is_none();
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
         shading.resolve = self.resolve.unwrap_or(shading.resolve);
         shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);
