@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use crate::accel::{BackendError, MemoryLimitError};
 use crate::bench::BenchError;
 use crate::crosscheck::RayTextError;
+use crate::export::GridError;
 use crate::image::ImageError;
 use crate::image::exr::MergeError;
 use crate::image::metrics::MetricsError;
@@ -130,6 +131,24 @@ pub enum CommandError {
     /// Several frames would be written to one file.
     #[error("{}: several frames need a place for their number in its name, such as frame.####.exr", .0.display())]
     FrameName(PathBuf),
+    /// Pictures of several cameras would be written to one file.
+    #[error("{}: several cameras need a place for their name in its name, such as {{camera}}.exr", .0.display())]
+    CameraFileName(PathBuf),
+    /// A camera was named twice.
+    #[error("camera `{0}` is named twice")]
+    CameraTwice(String),
+    /// Files of two cameras have one name.
+    #[error("{}: files of the cameras `{first}` and `{second}` would both be called `{file_name}`", scene.display())]
+    SameFileName {
+        /// The scene file.
+        scene: PathBuf,
+        /// Name of a camera.
+        first: String,
+        /// Name of another one.
+        second: String,
+        /// Both in names of files.
+        file_name: String,
+    },
     /// All frames were asked for where there are none.
     #[error("{}: nothing moves, so that `all` names no frames", scene.display())]
     NoFrames {
@@ -149,6 +168,14 @@ pub enum CommandError {
     Layers {
         /// The first output.
         file: PathBuf,
+    },
+    /// Mesh points make no regular grid.
+    #[error("{}", file.display())]
+    Grid {
+        /// What they are of.
+        file: PathBuf,
+        /// Why not.
+        source: GridError,
     },
     /// Threads can't be started.
     #[error("cannot start the threads")]

@@ -49,6 +49,11 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
                 "lightmesh render scene.toml --light-mesh field.lmesh --update -o picture.png",
                 "by a light mesh that is kept from render to render",
             ),
+            example("lightmesh render scene.toml --camera all -o {camera}.png", "a picture for each camera"),
+            example(
+                "lightmesh render scene.toml -o layers.exr --aov direct,error",
+                "with layers: direct light, and its estimated error",
+            ),
             example("lightmesh render scene.toml --tile 1/2 -o t1.exr", "the first half of a picture"),
             example(
                 "lightmesh render scene.toml --tile 2/2 -o t2.exr",
@@ -87,10 +92,13 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
     ),
     (
         &["export"],
-        &[example(
-            "lightmesh export field.lmesh -o field.vtu -o field.ply",
-            "baked mesh points, for ParaView and others",
-        )],
+        &[
+            example(
+                "lightmesh export field.lmesh -o field.vtu -o field.ply",
+                "baked mesh points, for ParaView and others",
+            ),
+            example("lightmesh export field.lmesh -o field.vti", "the same as a regular grid, for volumes"),
+        ],
     ),
     (
         &["info"],

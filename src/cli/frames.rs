@@ -7,7 +7,6 @@ use clap::Args;
 use super::error::CommandError;
 use super::interrupt::Interrupt;
 use super::progress::Reporter;
-use crate::image::output::{OutputFile, OutputTarget};
 use crate::render::{Moved, RenderError, Session, SessionError};
 use crate::scene::{Animation, Camera, Scene};
 use crate::settings::Settings;
@@ -118,32 +117,6 @@ impl FrameArgs {
         paths.find(lacks).map_or(Ok(()), |path| Err(CommandError::FrameName(path.to_owned())))
     }
 
-    /// The name of a file in a frame; without frames, or a place for the number, it is as given.
-    pub fn path(&self, path: &Path, number: Option<i64>) -> PathBuf {
-        number.and_then(|number| frame_path(path, number)).unwrap_or_else(|| path.to_owned())
-    }
-
-    /// The images of a frame, checked.
-    ///
-    /// # Errors
-    /// [`CommandError::Image`].
-    pub fn targets(
-        &self,
-        outputs: &[PathBuf],
-        number: Option<i64>,
-    ) -> Result<Vec<OutputTarget>, CommandError> {
-        let target = |path: &PathBuf| Ok(OutputTarget::new(&self.path(path, number))?);
-        outputs.iter().map(target).collect()
-    }
-
-    /// A file of a frame that is no image, checked.
-    ///
-    /// # Errors
-    /// [`CommandError::Image`].
-    pub fn file(&self, path: Option<&Path>, number: Option<i64>) -> Result<Option<OutputFile>, CommandError> {
-        path.map(|path| Ok(OutputFile::new(&self.path(path, number))?)).transpose()
-    }
-
     /// Makes a scene ready for all frames of its animation, before anything is built from it.
     pub fn prepare(&self, scene: &mut Scene, animation: &Animation, reporter: &Reporter) {
         if self.frames.is_none() {
@@ -244,6 +217,11 @@ fn in_words(moved: &Moved) -> String {
 
 fn counted(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// The name of a file in a frame; without a frame, or a place for its number, it is as given.
+pub fn path_in_frame(path: &Path, number: Option<i64>) -> PathBuf {
+    number.and_then(|number| frame_path(path, number)).unwrap_or_else(|| path.to_owned())
 }
 
 /// The name of a file in a frame: the number in place of #### in the file's name, with as many digits at least, or of %04d as in C; `None` without
@@ -365,6 +343,6 @@ mod tests {
         // Without frames a name is a name.
         let (still, name) = (FrameArgs::default(), Path::new("f#.exr"));
         assert!(still.check([name].into_iter()).is_ok());
-        assert_eq!(still.path(name, None), name);
+        assert_eq!(path_in_frame(name, None), name);
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use super::cameras::PictureName;
 use super::display::LiveDisplay;
 use super::error::CommandError;
 use super::interrupt::Interrupt;
@@ -39,10 +40,10 @@ impl Job<'_> {
     ///
     /// # Errors
     /// See [`CommandError`]; then no file of the image has changed.
-    pub fn run(&mut self, number: Option<i64>, camera: &Camera) -> Result<u64, CommandError> {
+    pub fn run(&mut self, name: PictureName, camera: &Camera) -> Result<u64, CommandError> {
         let Self { args, reporter, .. } = *self;
-        let targets = args.frames.targets(&args.output, number)?;
-        let stats_target = args.frames.file(args.stats.as_deref(), number)?;
+        let targets = name.targets(&args.output)?;
+        let stats_target = name.file(args.stats.as_deref())?;
         let written = Written::of(args, &self.ready.session, camera, &self.ready.settings);
         if args.resume && targets.iter().all(|target| is_written(target.path(), &written)) {
             let names: Vec<String> =

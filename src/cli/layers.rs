@@ -20,7 +20,7 @@ const ALL: &str = "all";
 #[derive(Args, Clone, Debug, Default)]
 pub struct LayerArgs {
     /// Layers to add to EXR files, separated by commas: direct, indirect, emission, reflection, albedo, normal, depth, position, object,
-    /// material, mesh-points; or all
+    /// material, mesh-points, error; or all
     #[arg(long, value_name = "LIST", default_value = "", hide_default_value = true)]
     pub aov: LayerList,
     /// Add a layer of direct light for each group of lights to EXR files

@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod cameras;
 mod choice;
 pub mod compare;
 mod completions;
@@ -110,6 +111,7 @@ impl Cli {
         let checked = match &self.command {
             Command::Bench(args) => args.check(),
             Command::Probe(args) => args.check(),
+            Command::Export(args) => args.check(),
             _ => Ok(()),
         };
         checked.map_err(|text| command().error(UsageError::ArgumentConflict, text))?;

@@ -185,7 +185,9 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
     let unit = args.lumens_per_watt.map_or(default_unit, |lumens_per_watt| Unit { lumens_per_watt });
     let how = ProbeSettings { directions: args.directions };
     let failed = |source| CommandError::Render { scene: args.scene.path.clone(), source };
-    let spinner = reporter.spinner("measuring");
+    let bar = reporter.bar("measuring");
+    let begin = |probes: usize| bar.set(0, probes as u64);
+    let done = |probes: usize| bar.add(probes as u64);
     if let Some(counts) = args.place.grid {
         let bounds = match args.corners.as_deref() {
             Some(&[a, b]) => Bounds { min: a.min(b), max: a.max(b) },
@@ -196,8 +198,10 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
             return Err(CommandError::Malformed { file: args.scene.path.clone(), problem });
         }
         let grid = ProbeGrid::in_box(bounds, counts);
-        let coefficients = measure_harmonics(&session, &grid.positions(), &settings, &how).map_err(failed)?;
-        spinner.finish_and_clear();
+        let positions = grid.positions();
+        begin(positions.len());
+        let coefficients = measure_harmonics(&session, &positions, &settings, &how, &done).map_err(failed)?;
+        bar.finish();
         let file = GridFile { grid: &grid, coefficients: &coefficients };
         for (format, target) in targets {
             match format {
@@ -211,8 +215,9 @@ fn run_with(args: &ProbeArgs, probes: &[Probe], targets: &Targets) -> Result<(),
         }
         return Ok(());
     }
-    let light = measure(&session, probes, &settings, &how).map_err(failed)?;
-    spinner.finish_and_clear();
+    begin(probes.len());
+    let light = measure(&session, probes, &settings, &how, &done).map_err(failed)?;
+    bar.finish();
     let lux: Vec<f32> = light.iter().map(|&light| unit.lux(light)).collect();
     let most = lux.iter().copied().fold(0.0, f32::max);
     let mean = lux.iter().map(|&lux| f64::from(lux)).sum::<f64>() / lux.len().max(1) as f64;

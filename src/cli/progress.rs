@@ -165,7 +165,7 @@ impl Bar {
     }
 
     /// Shows that as much more is done.
-    fn add(&self, more: u64) {
+    pub fn add(&self, more: u64) {
         match &self.shown {
             Shown::Nothing => {}
             Shown::Bar(bar) => bar.inc(more),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::cameras::CameraArgs;
 use super::frames::FrameArgs;
 use super::layers::LayerArgs;
 use super::light_mesh::LightMeshArgs;
@@ -33,9 +34,8 @@ pub struct RenderArgs {
     /// Store EXR files as 32-bit float instead of 16-bit half
     #[arg(long)]
     pub float: bool,
-    /// Camera to look through, by name
-    #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
+    #[command(flatten)]
+    pub cameras: CameraArgs,
     /// Write the images after every step, not only after the last one
     #[arg(long)]
     pub write_partial: bool,

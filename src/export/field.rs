@@ -20,13 +20,15 @@ pub enum Values {
     Scalars(Vec<f32>),
     /// Three, such as linear RGB.
     Vectors(Vec<Vec3>),
+    /// One whole number up to 255 each, such as marks.
+    Bytes(Vec<u8>),
 }
 
 impl Values {
     /// Numbers for each point.
     pub fn components(&self) -> usize {
         match self {
-            Self::Scalars(_) => 1,
+            Self::Scalars(_) | Self::Bytes(_) => 1,
             Self::Vectors(_) => 3,
         }
     }
@@ -36,6 +38,9 @@ impl Values {
         let (values, count) = match self {
             Self::Scalars(values) => ([values.get(index).copied().unwrap_or_default(), 0.0, 0.0], 1),
             Self::Vectors(values) => (values.get(index).copied().unwrap_or_default().to_array(), 3),
+            Self::Bytes(values) => {
+                ([values.get(index).copied().map(f32::from).unwrap_or_default(), 0.0, 0.0], 1)
+            }
         };
         values.into_iter().take(count)
     }
@@ -45,7 +50,7 @@ impl PointField {
     /// The known points of a direct light mesh: `DirectLight` of eq. (1) and `Unoccluded`, the same with all lights seen, linear RGB;
     /// `VisibleLights`, the number of lights seen; and `Layer`, the number of the point's layer.
     pub fn of_known(known: KnownPoints) -> Self {
-        let KnownPoints { positions, light, unoccluded, visible, layers } = known;
+        let KnownPoints { positions, light, unoccluded, visible, layers, grids: _ } = known;
         let scalars =
             |values: Vec<u32>| Values::Scalars(values.into_iter().map(|value| value as f32).collect());
         let named = |name: &str, values| (name.to_owned(), values);

@@ -43,7 +43,7 @@ pub fn encode_ply(field: &PointField) -> Vec<u8> {
 fn colours(field: &PointField) -> Option<Vec<[u8; 3]>> {
     let values = field.arrays.iter().find_map(|(_, values)| match values {
         Values::Vectors(values) => Some(values),
-        Values::Scalars(_) => None,
+        Values::Scalars(_) | Values::Bytes(_) => None,
     })?;
     let pixels: Vec<[f32; 3]> = values.iter().map(Vec3::to_array).collect();
     let exposure = auto_exposure(&pixels);

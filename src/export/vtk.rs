@@ -47,6 +47,10 @@ impl Appended {
     }
 
     fn values(&mut self, name: &str, count: usize, values: &Values) -> String {
+        if let Values::Bytes(values) = values {
+            let bytes = (0..count).map(|index| values.get(index).copied().unwrap_or_default());
+            return self.array(name, "UInt8", 1, bytes);
+        }
         let numbers = (0..count).flat_map(|index| values.of(index)).flat_map(f32::to_le_bytes);
         self.array(name, "Float32", values.components(), numbers)
     }

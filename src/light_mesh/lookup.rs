@@ -33,6 +33,8 @@ pub(crate) trait Differ {
 pub struct LookupScratch {
     /// D_y.
     pub(super) points: Neighbours,
+    /// A half of it.
+    pub(super) half: Neighbours,
     /// Searches that surface points close together share; `None` where surface points come from anywhere.
     cells: Option<CellCache>,
     /// Unions of neighbourhoods that were found.

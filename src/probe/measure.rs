@@ -23,6 +23,11 @@ pub struct ProbeSettings {
     pub directions: u32,
 }
 
+/// About how often it is said how many probes are measured, unless they are so many that threads would wait for each other's last ones.
+const REPORTS: usize = 1000;
+/// Probes that a thread measures before it says so, at most.
+const MOST_TOGETHER: usize = 64;
+
 impl ProbeSettings {
     /// More make no difference in single precision.
     pub const MOST_DIRECTIONS: u32 = 1 << 20;
@@ -41,6 +46,8 @@ impl Default for ProbeSettings {
 /// Under the preset `physical` values are in W/m² if lengths are metres and intensities W/sr. Otherwise they are what the renderer multiplies by
 /// k_d: light from surfaces is an integral over directions, divided by π.
 ///
+/// `done` is called with the numbers of probes that are measured, some at a time, in any order and from any thread.
+///
 /// # Errors
 /// [`RenderError::Settings`] and [`RenderError::Mesh`].
 pub fn measure(
@@ -48,13 +55,15 @@ pub fn measure(
     probes: &[Probe],
     settings: &Settings,
     how: &ProbeSettings,
+    done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Vec3>, RenderError> {
     let size = size_of_scene(session.scene());
     let station = |probe: &Probe| Station::new(probe.position, Sensor::of(probe), size);
-    run(session, probes.iter().map(station).collect(), settings, how, |[value, ..]| value)
+    run(session, probes.iter().map(station).collect(), settings, how, done, |[value, ..]| value)
 }
 
-/// Coefficients of the radiance that arrives at positions from all directions, in the basis of [`basis`](super::basis).
+/// Coefficients of the radiance that arrives at positions from all directions, in the basis of [`basis`](super::basis). `done` is called as by
+/// [`measure`].
 ///
 /// # Errors
 /// As [`measure`].
@@ -63,9 +72,10 @@ pub fn measure_harmonics(
     positions: &[Vec3],
     settings: &Settings,
     how: &ProbeSettings,
+    done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<[Vec3; COEFFICIENTS]>, RenderError> {
     let station = |position: &Vec3| Station::new(*position, Sensor::Harmonics, 0.0);
-    run(session, positions.iter().map(station).collect(), settings, how, |values| values)
+    run(session, positions.iter().map(station).collect(), settings, how, done, |values| values)
 }
 
 fn size_of_scene(scene: &Scene) -> f32 {
@@ -82,6 +92,7 @@ fn run<T: Send>(
     stations: Vec<Station>,
     settings: &Settings,
     how: &ProbeSettings,
+    done: &(dyn Fn(usize) + Sync),
     take: impl Fn(Values) -> T + Sync,
 ) -> Result<Vec<T>, RenderError> {
     settings.check()?;
@@ -103,5 +114,12 @@ fn run<T: Send>(
         vectorize(MeasureDirect { world, sensor, position, origin, values: &mut values });
         take(values)
     };
-    Ok(stations.par_iter().map(measure).collect())
+    // Some at a time, where there are many: a report may wait for another one.
+    let together = (stations.len() / REPORTS).clamp(1, MOST_TOGETHER);
+    let measure_some = |stations: &[Station]| {
+        let values: Vec<T> = stations.iter().map(measure).collect();
+        done(values.len());
+        values
+    };
+    Ok(stations.par_chunks(together).flat_map_iter(measure_some).collect())
 }

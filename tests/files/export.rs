@@ -5,9 +5,12 @@ use std::path::Path;
 use std::process::Command;
 
 use glam::{UVec3, Vec3};
-use lightmesh::export::{ImageGrid, PointField, Values, encode_ply, encode_vti, encode_vtu};
+use lightmesh::export::{
+    GridError, GridField, ImageGrid, PointField, Values, encode_ply, encode_vti, encode_vtu,
+};
+use lightmesh::light_mesh::direct::KnownPoints;
 use lightmesh::scene::Falloff;
-use lightmesh::settings::{Integrator, Spacing};
+use lightmesh::settings::{Integrator, PointLayout, Spacing};
 use serde_json::Value;
 
 use crate::common::data::missing;
@@ -29,6 +32,7 @@ print(json.dumps({
     "error": reader.GetErrorCode(),
     "points": [data.GetPoint(i) for i in range(count)],
     "arrays": {arrays.GetArrayName(i): tuples(arrays.GetArray(i)) for i in range(arrays.GetNumberOfArrays())},
+    "visible": [data.IsPointVisible(i) for i in range(count)] if name.endswith(".vti") else [],
     "cells": [data.GetCellType(i) for i in range(data.GetNumberOfCells())],
 }))
 "#;
@@ -63,6 +67,12 @@ fn numbers(value: &Value) -> Vec<Vec<f32>> {
 
 /// The known points of a light mesh around a plate that hides one of two lights.
 fn known() -> (PointField, Vec<Vec3>) {
+    let (known, light) = known_of(&PointLayout::Regular, &[0.4]);
+    (PointField::of_known(known), light)
+}
+
+/// Those of meshes of some spacings, one after the other.
+fn known_of(layout: &PointLayout, spacings: &[f32]) -> (KnownPoints, Vec<Vec3>) {
     let mut builder = Builder::default();
     builder.quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0, 0);
     builder.quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::Z, Vec3::X, 0);
@@ -74,12 +84,15 @@ fn known() -> (PointField, Vec<Vec3>) {
     let mut session = session(&scene);
     let mut settings = settings_at((24, 18));
     settings.shading.integrator = Integrator::LightMesh;
-    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.4));
+    settings.mesh.direct.layout = layout.clone();
     let view = camera(Vec3::new(0.0, 4.0, 5.0), Vec3::ZERO, 45.0);
-    session.render(&view, &settings).expect("a picture");
-    let field = PointField::of_known(session.known_points());
-    let light = session.direct_light(&field.positions);
-    (field, light)
+    for &spacing in spacings {
+        settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+        session.render(&view, &settings).expect("a picture");
+    }
+    let known = session.known_points();
+    let light = session.direct_light(&known.positions);
+    (known, light)
 }
 
 /// Every known point is a vertex in VTK, with the direct light that is traced anew there.
@@ -114,6 +127,61 @@ fn vtk_reads_the_known_points_of_a_light_mesh() {
     }
     assert!(visible.iter().any(|count| count[0] < 2.0), "the plate hides a light from something");
     assert!(layers.iter().all(|layer| layer[0] == 0.0), "one spacing is one layer");
+}
+
+/// In VTK every known point of a regular layer is a place of the grid, with the direct light that is traced anew there; all other places are hidden.
+#[test]
+fn vtk_reads_a_layer_of_mesh_points_as_a_grid() {
+    let (known, light) = known_of(&PointLayout::Regular, &[0.4]);
+    let field = GridField::of_known(&known, None).expect("a regular layer");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("layer.vti");
+    fs::write(&file, encode_vti(&field.grid, &field.arrays)).expect("writable");
+    let Some(read) = read(&file) else { return };
+    let places = numbers(&read["points"]);
+    let [found, unoccluded] = ["DirectLight", "Unoccluded"].map(|name| numbers(&read["arrays"][name]));
+    let [visible, marks] = ["VisibleLights", "Known"].map(|name| numbers(&read["arrays"][name]).concat());
+    let shown: Vec<bool> =
+        read["visible"].as_array().expect("a list").iter().map(|shown| shown == 1 || shown == true).collect();
+    let mut seen = 0;
+    for (place, at) in places.iter().map(|place| Vec3::from_slice(place)).enumerate() {
+        let near = |position: &Vec3| position.abs_diff_eq(at, 1e-4);
+        let point = known.positions.iter().position(near);
+        assert_eq!((shown[place], marks[place]), (point.is_some(), f32::from(point.is_some())), "{at}");
+        let Some(point) = point else {
+            assert!(
+                found[place] == [0.0; 3] && unoccluded[place] == [0.0; 3] && visible[place] == 0.0,
+                "{at}"
+            );
+            continue;
+        };
+        seen += 1;
+        let (value, traced) = (Vec3::from_slice(&found[place]), light[point]);
+        assert!(value.abs_diff_eq(traced, 1e-5 * traced.length()), "{value} for {traced} at {at}");
+        assert_eq!(visible[place], known.visible[point] as f32);
+    }
+    assert_eq!((seen, field.known), (known.positions.len(), known.positions.len()));
+    assert!(places.len() > seen, "the test shows nothing of hidden places");
+}
+
+/// Of several layers the one with most points is written, or the one that is asked for, whose points may be those of finer ones; what is no grid, or
+/// not there, is said.
+#[test]
+fn a_grid_is_of_one_regular_layer() {
+    let (known, _) = known_of(&PointLayout::Regular, &[0.4, 0.8]);
+    let step = |spacing| GridField::of_known(&known, spacing).map(|field| field.grid.step);
+    assert_eq!(step(None), Ok(Vec3::splat(0.4)));
+    // As it is typed.
+    assert_eq!(step(Some(0.800_01)), Ok(Vec3::splat(0.8)));
+    let coarse = GridField::of_known(&known, Some(0.8)).expect("a layer");
+    assert!(coarse.known > 20, "{} points", coarse.known);
+    assert_eq!(
+        step(Some(0.3)),
+        Err(GridError::NoSuchSpacing { asked: 0.3, spacings: "0.4, 0.8".to_owned() })
+    );
+    let (centred, _) = known_of(&PointLayout::BodyCentred, &[0.8]);
+    let error = GridField::of_known(&centred, None).expect_err("no regular layer");
+    assert!(error.to_string().contains(".vtu"), "{error}");
 }
 
 /// The places of a regular grid follow from origin, step and counts, x first.

@@ -5,10 +5,11 @@ use lightmesh::image::Image;
 use lightmesh::render::{Layer, LayerChoice, LayerCollector, LayerImage, RenderStats, StopToken};
 use lightmesh::scene::{Camera, Falloff, Light, Material, Scene};
 use lightmesh::settings::{
-    Estimator, IndirectForm, IndirectSettings, Integrator, Leaks, Named as _, Resolve, Settings,
+    Estimator, IndirectForm, IndirectSettings, Integrator, Leaks, Named as _, PointLayout, Radius, Resolve,
+    Settings, Spacing,
 };
 
-use crate::common::{Builder, camera, grey, light, session, settings_at};
+use crate::common::{Builder, camera, forest, grey, light, session, settings_at};
 
 /// Grey floor, wall, mirror, box and glowing panel, under lights of three groups.
 fn scene() -> Scene {
@@ -77,11 +78,20 @@ fn all() -> LayerChoice {
 }
 
 fn rendered(scene: &Scene, settings: &Settings, choice: LayerChoice) -> (Image, LayerImage, RenderStats) {
+    rendered_from(&view(), scene, settings, choice)
+}
+
+fn rendered_from(
+    camera: &Camera,
+    scene: &Scene,
+    settings: &Settings,
+    choice: LayerChoice,
+) -> (Image, LayerImage, RenderStats) {
     let collector = LayerCollector::new(choice);
     let mut session = session(scene);
     let stop = StopToken::default();
     let (image, stats) =
-        session.render_layers(&view(), settings, &(), &stop, Some(&collector)).expect("a picture");
+        session.render_layers(camera, settings, &(), &stop, Some(&collector)).expect("a picture");
     let layers = collector.take(&image).expect("the layers of this picture");
     (image, layers, stats)
 }
@@ -280,5 +290,83 @@ fn mesh_points_are_counted() {
         let counts = values(&layers, "mesh_points");
         assert_eq!(counts.iter().any(|&count| count >= 4.0), has_points);
         assert!(counts.iter().all(|&count| count.fract() == 0.0 && count < 1e4));
+    }
+}
+
+/// A picture of the forest and the layer of its error.
+fn with_error(settings: &Settings) -> (Image, Vec<f32>) {
+    let scene = forest(3_000, 20);
+    let choice = LayerChoice { layers: vec![Layer::Error], light_groups: false };
+    let (image, layers, _) = rendered_from(&scene.cameras[0], &scene.scene, settings, choice);
+    (image, values(&layers, "error").clone())
+}
+
+/// Averaged shadows of the forest.
+fn averaged(layout: PointLayout, spacing: f32, estimator: Estimator) -> Settings {
+    let mut settings = settings_at((64, 48));
+    settings.shading.resolve = Resolve::Average;
+    settings.shading.estimator = estimator;
+    settings.shading.kernel.leaks = Leaks::Allow;
+    settings.shading.kernel.radius = Radius::Units(1.2);
+    settings.shading.reference_samples = 256;
+    settings.mesh.direct.layout = layout;
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(spacing));
+    settings
+}
+
+/// Two halves of the mesh points around a surface point are wrong about as independently of each other as both together and the mean over D_y are, which
+/// the reference finds without a mesh: the layer's mean square is the true one to within a factor of three, for meshes of which the true one differs by
+/// more than that.
+#[test]
+fn the_error_layer_is_about_as_large_as_the_error() {
+    let mut truths = Vec::new();
+    for (layout, spacing, estimator) in [
+        (PointLayout::Regular, 1.2, Estimator::PerLight),
+        (PointLayout::Regular, 0.8, Estimator::PerLight),
+        (PointLayout::Regular, 0.4, Estimator::PerLight),
+        (PointLayout::Regular, 0.8, Estimator::Directional),
+        (PointLayout::BodyCentred, 0.8, Estimator::PerLight),
+        (PointLayout::Jittered { seed: 1 }, 0.8, Estimator::PerLight),
+        (PointLayout::BlueNoise { seed: 1 }, 0.8, Estimator::Ratio),
+    ] {
+        let what = format!("{layout:?}, {spacing}, {estimator}");
+        let mut settings = averaged(layout, spacing, estimator);
+        let (image, error) = with_error(&settings);
+        settings.shading.integrator = Integrator::Reference;
+        let (reference, no_error) = with_error(&settings);
+        assert!(no_error.iter().all(|error| *error == 0.0), "{what}: the reference has no mesh");
+        let mean_square = |errors: &mut dyn Iterator<Item = f32>| {
+            errors.map(|error| f64::from(error).powi(2)).sum::<f64>() / error.len() as f64
+        };
+        let pixels = || image.pixels().iter().zip(reference.pixels());
+        let mut differences =
+            pixels().map(|(a, b)| (Vec3::from(*a) - Vec3::from(*b)).abs().element_sum() / 3.0);
+        let (said, truth) = (mean_square(&mut error.iter().copied()), mean_square(&mut differences));
+        assert!(said < 3.0 * truth && truth < 3.0 * said, "{what}: {said} for {truth}");
+        truths.push(truth);
+    }
+    let most = truths.iter().copied().fold(0.0, f64::max);
+    let least = truths.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(most > 9.0 * least, "the test shows nothing: {truths:?}");
+}
+
+/// Who traces every shadow ray is not wrong. Traced shadow edges trust a weak light's share as long as all of them together, each by the most that it
+/// can be wrong, stay below a twentieth of the tolerance of the light that is estimated (method §4): so does the layer, and it is 0 where nothing is tolerated.
+#[test]
+fn the_error_layer_of_traced_shadows_is_what_weak_lights_may_cost() {
+    let mut settings = averaged(PointLayout::Regular, 0.8, Estimator::PerLight);
+    settings.shading.integrator = Integrator::Conventional;
+    assert!(with_error(&settings).1.iter().all(|error| *error == 0.0));
+
+    settings.shading.integrator = Integrator::LightMesh;
+    settings.shading.resolve = Resolve::Trace;
+    for tolerance in [0.0, 0.5] {
+        settings.shading.tolerance = tolerance;
+        let (image, error) = with_error(&settings);
+        let light: f32 = image.pixels().as_flattened().iter().sum::<f32>() / 3.0;
+        let error: f32 = error.iter().sum();
+        // What is estimated of the light where mesh points disagree is right on average to some per cent.
+        assert!(error <= 1.1 * 0.05 * tolerance * light, "{tolerance}: {error} of {light}");
+        assert_eq!(error > 0.0, tolerance > 0.0);
     }
 }

@@ -29,7 +29,7 @@ fn with_bounces(bounces: u32) -> Settings {
 }
 
 fn probe(scene: &Scene, probes: &[Probe], settings: &Settings) -> Vec<Vec3> {
-    measure(&session(scene), probes, settings, &ProbeSettings::default()).expect("measured")
+    measure(&session(scene), probes, settings, &ProbeSettings::default(), &|_| {}).expect("measured")
 }
 
 /// A plane of 4 by 4 at height 0 in the middle, facing up.
@@ -159,7 +159,7 @@ fn a_furnace_is_as_bright_in_all_directions() {
             }
             let how = ProbeSettings::default();
             let harmonics =
-                measure_harmonics(&session(&scene), &[position], &settings, &how).expect("measured");
+                measure_harmonics(&session(&scene), &[position], &settings, &how, &|_| {}).expect("measured");
             let constant = unit / PI * (4.0 * PI).sqrt() * expected;
             assert_within(harmonics[0][0].x, constant, tolerance, "harmonics");
             let others = harmonics[0][1..].iter().map(|value| value.x.abs()).fold(0.0, f32::max);
@@ -251,8 +251,8 @@ fn harmonics_of_a_distant_light_are_the_basis() {
     assert_eq!(positions.len(), 6);
     assert!(positions[1].abs_diff_eq(Vec3::new(0.75, 0.5, 1.0 / 6.0), 1e-6), "x changes fastest");
     let session = session(&free(vec![sun]));
-    let found =
-        measure_harmonics(&session, &positions, &direct(), &ProbeSettings::default()).expect("measured");
+    let found = measure_harmonics(&session, &positions, &direct(), &ProbeSettings::default(), &|_| {})
+        .expect("measured");
     // Y_lm at the direction that the light comes from, (x, y, z) = (−2, 6, −3)/7, from the table of real harmonics.
     let (x, y, z) = (-2.0 / 7.0, 6.0 / 7.0, -3.0 / 7.0f32);
     let expected = [

@@ -6,6 +6,7 @@ mod common;
 mod accuracy;
 mod awkward;
 mod bench;
+mod cameras;
 mod choice;
 mod command_line;
 mod compare;

@@ -145,11 +145,12 @@ fn wrong_usage_is_refused() {
     assert!(fs::read_dir(folder.path()).expect("a folder").count() == 3, "nothing was written");
 }
 
-/// The points that a camera needs are exported in both formats; other cameras and formats are refused.
+/// The points that a camera needs are exported in all formats; other cameras and formats are refused.
 #[test]
 fn points_of_a_view_are_exported() {
     let folder = folder();
-    let output = run(folder.path(), &["export", "scene.toml", "-o", "f.vtu", "-o", "f.ply"]);
+    let arguments = ["-o", "f.vtu", "-o", "f.ply", "-o", "f.vti"];
+    let output = run(folder.path(), &[&["export", "scene.toml"], &arguments[..]].concat());
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     let count = errors.lines().find_map(|line| line.strip_suffix(" points")).expect("the number is reported");
@@ -160,12 +161,35 @@ fn points_of_a_view_are_exported() {
     };
     holds("f.vtu", format!("NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\""));
     holds("f.ply", format!("element vertex {count}\n"));
-    for (arguments, expected) in [
-        (&["-o", "f.obj"][..], "ends in .vtu or .ply"),
-        (&["-o", "g.ply", "--camera", "none"], "no camera is named `none`"),
+    holds("f.vti", "<VTKFile type=\"ImageData\"".to_owned());
+    assert!(errors.contains(&format!(": {count} are known\n")), "{errors}");
+    let centred = SCENE.replace("[render]", "[light_mesh]\nlayout = \"body-centred\"\n[render]");
+    fs::write(folder.path().join("centred.toml"), centred).expect("writable");
+    for (scene, arguments, code, expected) in [
+        ("scene.toml", &["-o", "f.obj"][..], 1, "ends in .vtu, .ply or .vti"),
+        ("scene.toml", &["-o", "g.ply", "--camera", "none"], 1, "no camera is named `none`"),
+        (
+            "scene.toml",
+            &["-o", "g.vti", "--spacing", "7"],
+            1,
+            "scene.toml: no regular mesh points have the spacing 7; there",
+        ),
+        (
+            "scene.toml",
+            &["-o", "g.vtu", "--spacing", "7"],
+            2,
+            "--spacing goes with an output that ends in .vti",
+        ),
+        (
+            "centred.toml",
+            &["-o", "g.ply", "-o", "g.vti"],
+            1,
+            "centred.toml: holds no mesh points of the layout `regular`",
+        ),
     ] {
-        let output = run(folder.path(), &[&["export", "scene.toml"], arguments].concat());
+        let output = run(folder.path(), &[&["export", scene], arguments].concat());
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.code() == Some(1) && errors.contains(expected), "{errors}");
+        assert!(output.status.code() == Some(code) && errors.contains(expected), "{errors}");
     }
+    assert!(!folder.path().join("g.ply").exists(), "nothing was written");
 }

@@ -81,6 +81,33 @@ fn json_is_lines_of_events() {
     );
 }
 
+/// Probes are counted as pixels are, whether light is measured at points or in a grid.
+#[test]
+fn probes_are_counted() {
+    let folder = folder();
+    let places = [
+        &["--line", "-1,0,1", "1,0,1", "--samples", "300", "-o", "a.csv"][..],
+        &["--grid", "5x6x10", "-o", "a.bin"],
+    ];
+    for place in places {
+        let run = |form: &str| {
+            let arguments = ["probe", "a.toml", "--quiet", "--progress", form];
+            let output = lightmesh(folder.path(), &[&arguments[..], place].concat());
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            assert!(output.status.success(), "{}", text(&output.stderr));
+            [text(&output.stdout), text(&output.stderr)]
+        };
+        let events = events(&run("json")[1]);
+        let progress: Vec<_> = events.iter().filter(|event| event["event"] == "progress").collect();
+        assert!(progress.iter().all(|event| event["stage"] == "measuring" && event["total"] == 300));
+        let done: Vec<u64> = progress.iter().filter_map(|event| event["done"].as_u64()).collect();
+        assert!(done.is_sorted() && done.first() == Some(&0) && done.last() == Some(&300), "{done:?}");
+        assert!(run("openjd")[0].ends_with("openjd_progress: 100.0\n"));
+        assert!(run("bar")[1].ends_with("measuring: 100 %\n"));
+        assert_eq!(run("none"), [String::new(), String::new()]);
+    }
+}
+
 /// Sessions of Open Job Description read `openjd_progress: ` with a number from 0 to 100, `openjd_status: ` and `openjd_fail: `; nothing else is on
 /// stdout, and notices stay where they are.
 #[test]

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::derived::Basis;
 use super::mesh::DirectMesh;
+use crate::light_mesh::points::LayerGrid;
 use crate::lights::PackedLights;
 
 /// What a direct light mesh knows, by point in the order of evaluation.
@@ -19,6 +20,8 @@ pub struct KnownPoints {
     pub visible: Vec<u32>,
     /// Number of the layer, a layout and spacing; of points in several, the first.
     pub layers: Vec<u32>,
+    /// The grids of the layers, by number; `None` for layouts that are not regular.
+    pub grids: Vec<Option<LayerGrid>>,
 }
 
 impl DirectMesh {
@@ -45,6 +48,7 @@ impl DirectMesh {
             unoccluded: light.iter().map(|[_, all]| *all).collect(),
             visible: visible.collect(),
             layers: store.layers(),
+            grids: store.points.grids().collect(),
             positions,
         }
     }

@@ -223,20 +223,48 @@ impl DirectView<'_> {
         estimator.estimate(surface, &scratch.points)
     }
 
-    /// Adds to `sums` what the lights of each group give a surface point whose illumination is known: no ray of it counts again.
+    /// Finds the points again that the illumination of a surface point, the last that was found, follows from. That takes no ray: they are there still,
+    /// or no leak rule had a question.
     #[inline(always)]
-    pub(crate) fn add_by_group<A: Accel>(
+    pub(crate) fn find_again<A: Accel>(
         &self,
         accel: &A,
         surface: &SurfacePoint,
         scratch: &mut LookupScratch,
+    ) {
+        if scratch.points.is_empty() {
+            self.lookup.find(accel, surface, scratch, &self.estimator);
+        }
+    }
+
+    /// Adds to `sums` what the lights of each group give a surface point whose points are [found](Self::find_again).
+    #[inline(always)]
+    pub(crate) fn add_by_group(
+        &self,
+        surface: &SurfacePoint,
+        scratch: &LookupScratch,
         groups: &PackedGroups,
         sums: &mut [Vec3],
     ) {
-        let counted = (scratch.rays, scratch.fallbacks);
-        self.lookup.find(accel, surface, scratch, &self.estimator);
-        (scratch.rays, scratch.fallbacks) = counted;
         self.estimator.add_by_group(surface, &scratch.points, groups, sums);
+    }
+
+    /// Half the difference of what two halves of the points around a surface point make of its illumination (method §10): about what is wrong with the
+    /// mean of both. Its points must be [found](Self::find_again); 0 where a half is empty.
+    // Not inlined: only a layer asks for it.
+    #[inline(never)]
+    pub(crate) fn half_difference(&self, surface: &SurfacePoint, scratch: &mut LookupScratch) -> Vec3 {
+        let LookupScratch { points, half, .. } = scratch;
+        let set = &self.lookup.store.points;
+        let mut of_half = |second: bool| {
+            half.clone_from(points);
+            let is_in = |index: usize, _| set.is_in_second_half(points.ids()[index]) == second;
+            half.keep(is_in).then(|| self.estimator.estimate(surface, half))
+        };
+        match (of_half(false), of_half(true)) {
+            (Some(first), Some(second)) => 0.5 * (first - second),
+            _ => Vec3::ZERO,
+        }
     }
 
     /// [`DirectView::illumination`] of a surface point that is one of several in a row of the same normal.
@@ -253,6 +281,8 @@ impl DirectView<'_> {
         if self.estimator.estimator == Estimator::Directional
             && let Some(light) = self.directional_in_row(surface, scratch)
         {
+            // Those of another surface point.
+            scratch.points.clear();
             return light;
         }
         self.illumination(accel, surface, scratch)

@@ -15,6 +15,7 @@ pub mod spherical_harmonics;
 mod stored_bits;
 mod witnesses;
 
+pub use crate::light_mesh::points::LayerGrid;
 pub(crate) use estimators::FieldEstimator;
 pub use known::KnownPoints;
 pub use mesh::{DirectEvaluation, DirectInterpolation, DirectMesh, DirectView};

@@ -21,6 +21,18 @@ pub struct Lattice {
     inverse_spacing: Vec3,
 }
 
+/// The grid of a regular layer: its points lie at whole numbers of spacings from the origin, as single precision has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerGrid {
+    /// One of its points.
+    pub origin: Vec3,
+    /// From one point to the next along each axis.
+    pub spacing: Vec3,
+}
+
+/// The lowest bits of x, y and z in a point's id, see [`place`].
+const PARITY: u64 = 0b1101;
+
 /// Place of a cell within its brick.
 #[inline(always)]
 fn place(cell: IVec3) -> u64 {
@@ -31,6 +43,16 @@ impl Lattice {
     /// Grid through `origin` with `spacing` per axis (> 0).
     pub fn new(origin: Vec3, spacing: Vec3) -> Self {
         Self { origin, spacing, inverse_spacing: spacing.recip() }
+    }
+
+    /// Where the points lie.
+    pub fn grid(&self) -> LayerGrid {
+        LayerGrid { origin: self.origin, spacing: self.spacing }
+    }
+
+    /// Whether a point is in the second of two halves of all points, each of whose six neighbours is in the other half: x + y + z is odd.
+    pub fn is_in_second_half(id: u64) -> bool {
+        (id & PARITY).count_ones() % 2 == 1
     }
 
     /// Position of a point.
@@ -169,6 +191,19 @@ mod tests {
         let ids: HashSet<u64> = points.iter().map(|&(id, _)| id).collect();
         assert_eq!(ids.len(), points.len());
         assert!(points.len() > 16 * 26 * 15);
+    }
+
+    /// Each half lies around every point of the other: neighbours along each axis are in different halves.
+    #[test]
+    fn halves_alternate_along_each_axis() {
+        let lattice = lattice();
+        for (id, position) in points(&lattice) {
+            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+                // Rounding may keep the neighbour from being exactly there, which a search forgives.
+                let next = lattice.nearest(&Kernel::new(position + axis * lattice.spacing, None, 1.0, false));
+                assert_ne!(Lattice::is_in_second_half(id), Lattice::is_in_second_half(next), "{position}");
+            }
+        }
     }
 
     /// The points of a spacing are among those of half of it, to the bit, when both have the same origin.

@@ -13,6 +13,7 @@ mod point_set;
 
 pub(crate) use cells::{CellCache, PointPacket, Surroundings};
 pub(crate) use kernel::Kernel;
+pub use lattice::LayerGrid;
 pub use neighbourhoods::{AutoSpacing, Neighbourhoods};
 pub use neighbours::Neighbours;
 pub use point_set::{MeshError, PointSet};

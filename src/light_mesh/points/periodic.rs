@@ -33,6 +33,8 @@ pub struct PeriodicPoints {
     points: Vec<Vec3>,
     /// First point of each cell (x fastest), by the cell's own number; one more at the end of the curve.
     cells: Vec<(u32, u32)>,
+    /// Bits of an id of which an odd number says that the point is in the second half.
+    parity: u64,
 }
 
 /// How the points of a tile are laid out.
@@ -64,7 +66,19 @@ impl PeriodicPoints {
                 (begin as u32, end as u32)
             })
             .collect();
-        Self { origin, spacing, inverse_spacing: spacing.recip(), points, cells }
+        let parity = match layout {
+            // A cell's corner, then its centre; points along the curve.
+            PeriodicLayout::BodyCentred | PeriodicLayout::BlueNoise => 0b1,
+            // The lowest bits of x, y and z of the cell.
+            PeriodicLayout::Jittered => 0b111,
+        };
+        Self { origin, spacing, inverse_spacing: spacing.recip(), points, cells, parity }
+    }
+
+    /// Whether a point is in the second of two halves of all points that lie among each other: corners and centres of cells, or the points of every other
+    /// cell, or every other point along the curve.
+    pub fn is_in_second_half(&self, id: u64) -> bool {
+        (id & self.parity).count_ones() % 2 == 1
     }
 
     /// The point that lies exactly at a position, if there is one.

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::ids::{LAYER_SHIFT, MOST_LAYERS, anchor, too_fine};
 use super::kernel::Kernel;
-use super::lattice::Lattice;
+use super::lattice::{Lattice, LayerGrid};
 use super::list::PointList;
 use super::neighbours::Neighbours;
 use super::periodic::{PeriodicLayout, PeriodicPoints};
@@ -131,6 +131,14 @@ impl PointSet {
         self.layers.iter().map(|layer| (&layer.layout, layer.spacing, layer.levels))
     }
 
+    /// Grids of the layers, in the order of their numbers; `None` for layouts that are not regular.
+    pub(crate) fn grids(&self) -> impl Iterator<Item = Option<LayerGrid>> {
+        self.layers.iter().map(|layer| match &layer.positions {
+            Positions::Lattice(lattice) => Some(lattice.grid()),
+            Positions::Periodic(_) | Positions::List(_) => None,
+        })
+    }
+
     /// Number of the layer of a point.
     pub(crate) fn layer_of(id: u64) -> usize {
         (id >> LAYER_SHIFT) as usize
@@ -157,6 +165,17 @@ impl PointSet {
     pub fn position(&self, id: u64) -> Vec3 {
         let layer = &self.layers[(id >> LAYER_SHIFT) as usize];
         with_positions!(layer, positions => positions.position(id - layer.first_id))
+    }
+
+    /// Whether a point is in the second of two halves of its layer that lie among each other, so that both surround a place with several points around it.
+    pub(crate) fn is_in_second_half(&self, id: u64) -> bool {
+        let layer = &self.layers[Self::layer_of(id)];
+        match &layer.positions {
+            Positions::Lattice(_) => Lattice::is_in_second_half(id - layer.first_id),
+            Positions::Periodic(points) => points.is_in_second_half(id - layer.first_id),
+            // Every other one of those that follow each other in space.
+            Positions::List(_) => id % 2 == 1,
+        }
     }
 
     /// Whether points of a layer take the values of points of another one: those of coarser layers that they build on, and otherwise layers in which

@@ -46,6 +46,8 @@ named_enum! {
         Material = "material",
         /// mesh points that light is interpolated from
         MeshPoints = "mesh-points",
+        /// estimated error of direct light
+        Error = "error",
     }
 }
 

@@ -14,16 +14,29 @@ pub struct LightParts<'a> {
     pub(in crate::render) groups: Option<GroupLight<'a>>,
     /// Mesh points in the neighbourhood, if they are to be counted; 0 where an integrator has none.
     pub(in crate::render) mesh_points: Option<Vec<u32>>,
+    /// Estimated error of direct light, if that is asked for; 0 where an integrator makes none, or knows of none.
+    pub(in crate::render) error: Option<Vec<Vec3>>,
 }
 
 impl<'a> LightParts<'a> {
     /// Of so many vertices, dark as yet.
-    pub(super) fn new(vertices: usize, groups: Option<&'a PackedGroups>, count_points: bool) -> Self {
+    pub(super) fn new(
+        vertices: usize,
+        groups: Option<&'a PackedGroups>,
+        count_points: bool,
+        estimate_error: bool,
+    ) -> Self {
         Self {
             indirect: vec![Vec3::ZERO; vertices],
             groups: groups.map(|groups| GroupLight::new(groups, vertices)),
             mesh_points: count_points.then(|| vec![0; vertices]),
+            error: estimate_error.then(|| vec![Vec3::ZERO; vertices]),
         }
+    }
+
+    /// What is asked for beside the sum of direct light: that of each group, and its error by vertex.
+    pub(in crate::render) fn of_direct(&mut self) -> (Option<&mut GroupLight<'a>>, Option<&mut [Vec3]>) {
+        (self.groups.as_mut(), self.error.as_deref_mut())
     }
 
     /// Counts the mesh points around each vertex.

@@ -39,6 +39,8 @@ struct PixelLight {
     indirect: Vec3,
     emission: Vec3,
     reflection: Vec3,
+    /// Estimated error of direct light.
+    error: Vec3,
 }
 
 impl<'a> LayerRecord<'a> {
@@ -55,7 +57,9 @@ impl<'a> LayerRecord<'a> {
 
     /// The parts that an integrator has to tell apart in the light of so many vertices.
     pub fn parts(&self, vertices: usize) -> LightParts<'_> {
-        LightParts::new(vertices, self.groups.as_ref(), self.choice.has(Layer::MeshPoints))
+        let (count_points, estimate_error) =
+            (self.choice.has(Layer::MeshPoints), self.choice.has(Layer::Error));
+        LightParts::new(vertices, self.groups.as_ref(), count_points, estimate_error)
     }
 
     /// Takes up a tile whose vertices are shaded: `light` is their direct light. Replaces the radiance of its pixels, summed over their
@@ -70,6 +74,7 @@ impl<'a> LayerRecord<'a> {
                 indirect: Vec3::ZERO,
                 emission,
                 reflection,
+                error: Vec3::ZERO,
             })
             .collect();
         let group_count = parts.groups.as_ref().map_or(0, |groups| groups.count());
@@ -78,6 +83,9 @@ impl<'a> LayerRecord<'a> {
         for (number, (vertex, &light)) in vertices.iter().zip(light).enumerate() {
             let pixel = &mut pixels[vertex.pixel as usize];
             let indirect = vertex.reflectance * parts.indirect[number];
+            if let Some(error) = parts.error.as_ref().and_then(|error| error.get(number)) {
+                pixel.error += vertex.reflectance * *error;
+            }
             if number >= first.vertices {
                 pixel.reflection += vertex.reflectance * light + indirect;
                 continue;
@@ -96,7 +104,8 @@ impl<'a> LayerRecord<'a> {
             }
         }
         for (number, pixel) in pixels.iter_mut().enumerate() {
-            for part in [&mut pixel.direct, &mut pixel.indirect, &mut pixel.emission, &mut pixel.reflection] {
+            let PixelLight { direct, indirect, emission, reflection, error } = pixel;
+            for part in [direct, indirect, emission, reflection, error] {
                 *part *= scale;
             }
             if group_count > 0 {
@@ -127,7 +136,7 @@ impl<'a> LayerRecord<'a> {
                 Layer::Albedo => add("Albedo", &colours, false),
                 Layer::Normal => add("N", &axes, false),
                 Layer::Position => add("P", &axes, true),
-                Layer::Depth | Layer::MeshPoints | Layer::Object | Layer::Material => {}
+                Layer::Depth | Layer::MeshPoints | Layer::Error | Layer::Object | Layer::Material => {}
             }
         }
         for group in self.groups.iter().flat_map(PackedGroups::names) {
@@ -141,6 +150,9 @@ impl<'a> LayerRecord<'a> {
         }
         if self.choice.has(Layer::MeshPoints) {
             channels.push(("mesh_points".to_owned(), true));
+        }
+        if self.choice.has(Layer::Error) {
+            channels.push(("error".to_owned(), true));
         }
         channels
     }
@@ -169,7 +181,7 @@ impl<'a> LayerRecord<'a> {
                 Layer::Albedo => add(&mut hits.iter().map(|hit| mean(hit.albedo, hit.samples))),
                 Layer::Normal => add(&mut hits.iter().map(|hit| mean(hit.normal, hit.samples))),
                 Layer::Position => add(&mut hits.iter().map(|hit| hit.position)),
-                Layer::Depth | Layer::MeshPoints | Layer::Object | Layer::Material => {}
+                Layer::Depth | Layer::MeshPoints | Layer::Error | Layer::Object | Layer::Material => {}
             }
         }
         for group in groups {
@@ -183,6 +195,9 @@ impl<'a> LayerRecord<'a> {
         }
         if self.choice.has(Layer::MeshPoints) {
             channels.push(mesh_points.iter().map(|&count| count as f32).collect());
+        }
+        if self.choice.has(Layer::Error) {
+            channels.push(pixels.iter().map(|pixel| pixel.error.abs().element_sum() / 3.0).collect());
         }
         channels
     }
@@ -226,7 +241,7 @@ impl<'a> LayerRecord<'a> {
 impl PixelLight {
     /// What the picture shows: the sum in double precision, in this order, so that only its rounding lies between it and the layers.
     fn sum(&self) -> Vec3 {
-        let Self { direct, indirect, emission, reflection } = self;
+        let Self { direct, indirect, emission, reflection, error: _ } = self;
         let sum = direct.as_dvec3() + indirect.as_dvec3() + emission.as_dvec3() + reflection.as_dvec3();
         sum.as_vec3()
     }

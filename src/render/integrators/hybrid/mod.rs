@@ -16,7 +16,7 @@ use glam::Vec3;
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
-use crate::render::layers::GroupLight;
+use crate::render::layers::LightParts;
 use crate::render::meshes::MeshInterpolation;
 use crate::render::paths::TilePaths;
 use crate::render::shadow_edges::smooth_shadow_edges;
@@ -27,7 +27,7 @@ use patch::Patch;
 use prior::Prior;
 use trace::LightTracer;
 
-/// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light, and `groups` with its parts.
+/// Shades the vertices of a tile: fills `light` with the I of each, before the scale of direct light, and with it what is asked for of its `parts`.
 #[allow(clippy::too_many_arguments, reason = "what shading has to know is no thing of its own")]
 #[inline(always)]
 pub(super) fn shade_hybrid<A: Accel>(
@@ -38,17 +38,19 @@ pub(super) fn shade_hybrid<A: Accel>(
     paths: &TilePaths,
     scratch: &mut LookupScratch,
     light: &mut [Vec3],
-    mut groups: Option<&mut GroupLight>,
+    parts: Option<&mut LightParts>,
 ) -> ShadeCounters {
     let lights = mesh.estimator.lights;
     let vertices = &paths.vertices;
     if lights.is_empty() || vertices.is_empty() {
         return ShadeCounters::default();
     }
+    let (mut groups, mut error) = parts.map_or((None, None), |parts| parts.of_direct());
     let mut patches = Patch::cut(tile, vertices);
     let mut prior = Prior::new(mesh, interpolation.tolerance);
     for patch in &mut patches {
-        prior.add(patch, vertices, scratch);
+        let error = error.as_deref_mut().and_then(|error| error.get_mut(patch.vertices.clone()));
+        prior.add(patch, vertices, scratch, error);
     }
     // What single lights come to matters for edges within pixels, and for groups of lights.
     let is_asked = !paths.origins.is_empty() || groups.is_some();

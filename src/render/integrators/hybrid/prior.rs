@@ -1,5 +1,7 @@
 //! What the mesh says of the lights, patch by patch, and what follows from it without a ray.
 
+use glam::Vec3;
+
 use super::patch::Patch;
 use crate::light_mesh::direct::{DirectView, Witnesses};
 use crate::light_mesh::lookup::LookupScratch;
@@ -68,9 +70,15 @@ impl<'a> Prior<'a> {
     /// Sorts the lights for the next patch, and adds to its light what needs no ray.
     ///
     /// Of the lights on which mesh points disagree the weakest are not traced, as long as what they may be wrong by sums up to no
-    /// more than [`WEAK_PART`] of `tolerance`, as a share of the light of any point.
+    /// more than [`WEAK_PART`] of `tolerance`, as a share of the light of any point. What that is of each point is added to `error`, if anybody asks.
     #[inline(always)]
-    pub fn add(&mut self, patch: &mut Patch, vertices: &[PathVertex], scratch: &mut LookupScratch) {
+    pub fn add(
+        &mut self,
+        patch: &mut Patch,
+        vertices: &[PathVertex],
+        scratch: &mut LookupScratch,
+        mut error: Option<&mut [Vec3]>,
+    ) {
         let Self { mesh, tolerance, witnesses, doubts, .. } = self;
         let lights = mesh.estimator.lights;
         let surfaces = vertices[patch.vertices.clone()].iter().map(|vertex| &vertex.surface);
@@ -131,6 +139,10 @@ impl<'a> Prior<'a> {
             }
             let intensity = lights.intensity(*index, *light).map(|channel| channel * share);
             patch.add_light(intensity, factors);
+            if let Some(error) = &mut error {
+                let most = Vec3::from(lights.intensity(*index, *light)) * share.max(1.0 - share);
+                error.iter_mut().zip(factors).for_each(|(error, factor)| *error += most * *factor);
+            }
             self.open[row + index] &= !(1 << light);
             self.weak[row + index] |= 1 << light;
         }
