@@ -2,28 +2,19 @@
 
 use glam::Vec3;
 
+use super::errors::PIXELS;
 use super::mean;
 use crate::accel::Accel;
 use crate::image::Image;
-use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
-use crate::render::accuracy::{Accuracy, Ending, ErrorEstimate, Measure, PartError};
+use crate::render::accuracy::{Accuracy, Ending};
 use crate::render::error::RenderError;
 use crate::render::fixed::View;
-use crate::render::held_out::{HeldOut, Pixels};
-use crate::render::integrators::LightMeshIntegrator;
-use crate::render::meshes::{LightMeshes, MeshInterpolation};
-use crate::render::need::needed_points;
+use crate::render::held_out::HeldOut;
+use crate::render::memory::NeededMemory;
+use crate::render::meshes::LightMeshes;
 use crate::render::settled::Settled;
 use crate::render::stats::{RenderStats, timed};
 use crate::settings::{Estimator, IndirectForm, Neighbourhood, PointLayout, Radius, Settings, Spacing};
-
-/// Rays that measuring the error may take where shadows are averaged, as a share of the camera rays, since those of the mesh aren't known yet, and
-/// what is always spent, with which a frame of a tenth of a second says something about itself: they cost four times as much as camera rays.
-const MEASURED_BY_CAMERA: f64 = 0.02;
-const FEWEST_RAYS: f64 = 5e4;
-
-/// Pixels that are held out at least, and at most.
-const PIXELS: (usize, usize) = (96, 2048);
 
 /// Spacings that are tried are R times powers of 2, this many to an octave, down to R/4: already there a surface point has some 130 points to weigh, which
 /// takes longer than conventional tracing unless lights are many, and memory for the points grows eightfold with each further octave. Who wants a finer
@@ -69,6 +60,13 @@ impl<A: Accel> View<'_, A> {
                 self.choose_points(&mut settings, asked, &mut open, meshes, &mut trial)
             });
             let rendered = chosen.and_then(|()| self.render_fixed(&settings, meshes));
+            if matches!(rendered, Err(RenderError::Memory { .. }))
+                && pictures == 1
+                && open.as_mut().is_some_and(OpenSpacing::begin_again)
+            {
+                // Light from surfaces has taken its part by now: with what is left, a coarser mesh may do.
+                continue;
+            }
             let (image, mut stats) = match self.or_before(rendered, before.take())? {
                 ended @ (_, RenderStats { accuracy: Some(_), .. }) => return Ok(ended),
                 rendered => rendered,
@@ -80,18 +78,19 @@ impl<A: Accel> View<'_, A> {
                 let errors = self.errors_of(&settings, meant, &mut held_out, meshes, &mut trial)?;
                 Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
             });
-            let (found, is_late) = self.or_unmeasured(found)?;
+            let (found, ended) = self.or_unmeasured(found)?;
             stats.rays.add(&trial.rays);
             stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
             stats.seconds.check += seconds;
             // That the error is small enough was said with confidence before; brighter pixels would have to contradict it.
             let missed = found.filter(|found| found.error > asked);
             let ending = match (&mut open, missed) {
-                _ if is_late => Ending::Time,
-                (_, None) => Ending::Error,
+                (_, None) => ended.unwrap_or(Ending::Error),
+                (Some(open), _) if open.by_memory => Ending::Memory,
                 (None, _) if self.settled.is_some() => Ending::Settled,
                 (None, _) => Ending::Settings,
                 (Some(open), Some(missed)) => {
+                    open.shown = open.fitting;
                     open.refine(missed.error / asked);
                     Ending::Finest
                 }
@@ -156,7 +155,7 @@ impl<A: Accel> View<'_, A> {
             meshes.interpolation(self.world.scene, self.camera, settings)?.direct.neighbourhoods.radius();
         settings.shading.kernel.radius = Radius::Units(radius);
         let held_out = HeldOut::new(&self.frame(settings), 1, PIXELS.1);
-        Ok(Some(OpenSpacing { radius, step: 0, held_out }))
+        Ok(Some(OpenSpacing { radius, step: 0, held_out, fitting: None, shown: None, by_memory: false }))
     }
 
     /// Puts the coarsest points into the settings whose error at pixels all over the picture is within the limit, if their spacing is open. What is
@@ -173,20 +172,69 @@ impl<A: Accel> View<'_, A> {
         while open.step <= FINEST {
             let before = std::mem::replace(&mut settings.mesh.direct.spacing, open.spacing());
             let meant = settings.shading.estimator;
-            let errors = match self.errors_of(settings, meant, &mut open.held_out, meshes, stats) {
+            let errors = self
+                .check_memory(settings, meshes)
+                .and_then(|()| self.errors_of(settings, meant, &mut open.held_out, meshes, stats));
+            let errors = match errors {
                 Err(RenderError::Mesh(_)) if open.step > 0 => {
                     settings.mesh.direct.spacing = before;
                     open.step = FINEST;
                     return Ok(());
                 }
+                Err(error @ RenderError::Memory { .. }) => {
+                    return self.take_what_fits(settings, open, meshes, error);
+                }
                 errors => errors?,
             };
+            open.fitting = Some(open.step);
             match errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) {
                 Some(estimate) => open.refine(estimate.error / asked),
                 None => return self.choose_estimator(settings, asked, open, meshes, stats),
             }
         }
         Ok(())
+    }
+
+    /// Puts the finest points into the settings that memory allows, of those between what was tried before and what it doesn't allow.
+    ///
+    /// # Errors
+    /// The one that is given, if there are none, or none but those of a picture that is finished.
+    fn take_what_fits(
+        &self,
+        settings: &mut Settings,
+        open: &mut OpenSpacing,
+        meshes: &mut LightMeshes,
+        error: RenderError,
+    ) -> Result<(), RenderError> {
+        let first = open.fitting.map_or(0, |step| step + 1);
+        let beyond = open.step;
+        open.by_memory = true;
+        for step in (first..beyond).rev() {
+            open.step = step;
+            settings.mesh.direct.spacing = open.spacing();
+            match self.check_memory(settings, meshes) {
+                Err(RenderError::Memory { .. }) => {}
+                fits => return fits,
+            }
+        }
+        let fitting = open.fitting.filter(|_| open.fitting != open.shown).ok_or(error)?;
+        open.step = fitting;
+        settings.mesh.direct.spacing = open.spacing();
+        Ok(())
+    }
+
+    /// Checks that memory allows the mesh of these settings for the whole picture.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`], and those of [`View::render`].
+    fn check_memory(&self, settings: &Settings, meshes: &mut LightMeshes) -> Result<(), RenderError> {
+        if settings.limits.memory.is_none() {
+            return Ok(());
+        }
+        let interpolation = meshes.interpolation(self.world.scene, self.camera, settings)?;
+        let (mut frame, mut stats) = (self.frame(settings), RenderStats::default());
+        let needed = NeededMemory::of(&mut frame, settings, meshes, &interpolation, &mut stats)?;
+        needed.iter().try_for_each(|needed| needed.check(self.world.lights, meshes, &interpolation))
     }
 
     /// Takes `directional` where it may take the place of `per-light`, costs less and is good enough.
@@ -202,94 +250,18 @@ impl<A: Accel> View<'_, A> {
         let may = settings.limits.estimator_open && meant == Estimator::PerLight;
         if may && self.world.lights.len() >= MANY_LIGHTS {
             settings.shading.estimator = Estimator::Directional;
-            let errors = self.errors_of(settings, meant, &mut open.held_out, meshes, stats)?;
-            if errors.estimate(None).is_some_and(|estimate| !estimate.is_within(asked)) {
+            let errors = self
+                .check_memory(settings, meshes)
+                .and_then(|()| self.errors_of(settings, meant, &mut open.held_out, meshes, stats));
+            let is_good = match errors {
+                Err(RenderError::Memory { .. }) => false,
+                errors => errors?.estimate(None).is_none_or(|estimate| estimate.is_within(asked)),
+            };
+            if !is_good {
                 settings.shading.estimator = meant;
             }
         }
         Ok(())
-    }
-
-    /// What is wrong with direct light at the held-out pixels, in a picture that is `meant` to be by an estimator, perhaps another than that of the
-    /// settings.
-    ///
-    /// They are compared with what another mesh of the same density gives, whose points lie elsewhere. Both miss the mean over D_y by as much,
-    /// independently of each other, so that the mean of the squared difference is twice that of the error. The other one traces all lights: where a
-    /// mesh has levels it may be the better one by far, and the whole difference is taken for the error, which is then too large rather than too small.
-    fn errors_of(
-        &self,
-        settings: &Settings,
-        meant: Estimator,
-        held_out: &mut HeldOut,
-        meshes: &mut LightMeshes,
-        stats: &mut RenderStats,
-    ) -> Result<Errors, RenderError> {
-        let mut as_meant = settings.clone();
-        as_meant.shading.estimator = meant;
-        let interpolation = meshes.interpolation(self.world.scene, self.camera, &as_meant)?;
-        let count = self.pixels_for(&interpolation, settings);
-        held_out.trace(&self.frame(settings), count.saturating_sub(held_out.paths.len()))?;
-        let right = self.shaded_by(&mut meshes.direct, &interpolation, held_out, count);
-        stats.add_direct(right.evaluation);
-        let elsewhere = meshes.other_interpolation(&as_meant)?;
-        let other = self.shaded_by(&mut meshes.other, &elsewhere, held_out, count);
-        let rays = other.rays();
-        let errors = |shown: &Pixels, share: f32| {
-            held_out.errors(shown, &other.pixels, |difference| share * difference.length_squared())
-        };
-        if settings.shading.estimator == meant {
-            let share = if settings.mesh.direct.levels == 0 { 0.5 } else { 1.0 };
-            return Ok(Errors { parts: errors(&right.pixels, share), rays });
-        }
-        // Of another estimator, what it differs by from the other mesh, without what is that mesh's own error.
-        let own = errors(&right.pixels, 0.5);
-        let interpolation = meshes.interpolation(self.world.scene, self.camera, settings)?;
-        let shown = self.shaded_by(&mut meshes.direct, &interpolation, held_out, count);
-        stats.add_direct(shown.evaluation);
-        let mut parts = errors(&shown.pixels, 1.0);
-        parts.iter_mut().zip(&own).for_each(|(part, own)| part.wrong -= own.wrong);
-        Ok(Errors { parts, rays })
-    }
-
-    /// Direct light of the first `count` held-out pixels by a mesh.
-    fn shaded_by(
-        &self,
-        mesh: &mut DirectMesh,
-        interpolation: &MeshInterpolation,
-        held_out: &HeldOut,
-        count: usize,
-    ) -> ShadedPixels {
-        let world = self.world;
-        let paths = held_out.paths.get(..count).unwrap_or(&held_out.paths);
-        let lookup = mesh.view(world.lights, &interpolation.direct).lookup;
-        let needed = needed_points(paths, lookup);
-        let evaluation = mesh.evaluate(world, &interpolation.direct, &needed);
-        let integrator = LightMeshIntegrator { world, direct: mesh, indirect: None, interpolation };
-        let (pixels, leak_rays) = held_out.shaded(&integrator, 0..count);
-        ShadedPixels { pixels, evaluation, leak_rays }
-    }
-
-    /// Pixels that are held out to judge a mesh: the denser it is, the more rays each takes.
-    fn pixels_for(&self, interpolation: &MeshInterpolation, settings: &Settings) -> usize {
-        let (width, height) = settings.view.resolution;
-        let camera_rays = f64::from(width) * f64::from(height) * f64::from(settings.view.samples_per_pixel);
-        let per_pixel = interpolation.direct.neighbourhoods.points_around() * self.world.lights.len() as f32;
-        let affordable = (MEASURED_BY_CAMERA * camera_rays).max(FEWEST_RAYS) / f64::from(per_pixel.max(1.0));
-        (affordable as usize).clamp(PIXELS.0, PIXELS.1)
-    }
-}
-
-/// Held-out pixels by a mesh, and what they took.
-struct ShadedPixels {
-    pixels: Pixels,
-    evaluation: DirectEvaluation,
-    /// Rays by which surface points looked which mesh points they see.
-    leak_rays: u64,
-}
-
-impl ShadedPixels {
-    fn rays(&self) -> u64 {
-        self.evaluation.shadow + self.evaluation.inside + self.leak_rays
     }
 }
 
@@ -301,9 +273,22 @@ struct OpenSpacing {
     step: u32,
     /// Pixels at which it is tried.
     held_out: HeldOut,
+    /// The finest that was tried, and for which there is memory.
+    fitting: Option<u32>,
+    /// That of a picture that is finished.
+    shown: Option<u32>,
+    /// Whether memory allows no finer one.
+    by_memory: bool,
 }
 
 impl OpenSpacing {
+    /// Begins with the coarsest again; whether that was not tried alone.
+    fn begin_again(&mut self) -> bool {
+        let is_finer = self.step > 0;
+        (self.step, self.fitting) = (0, None);
+        is_finer
+    }
+
     fn spacing(&self) -> Spacing {
         Spacing::Units(Vec3::splat(self.radius * (-(self.step as f32) / STEPS_PER_OCTAVE).exp2()))
     }
@@ -321,19 +306,5 @@ impl OpenSpacing {
         let next = self.step.saturating_add(((octaves * STEPS_PER_OCTAVE).round() as u32).max(1));
         // The finest one is tried, unless it was.
         self.step = if self.step < FINEST { next.min(FINEST) } else { next };
-    }
-}
-
-/// What is wrong with parts of a picture.
-struct Errors {
-    parts: Vec<PartError>,
-    /// Rays that it took to find out.
-    rays: u64,
-}
-
-impl Errors {
-    /// The error they make; `mean_shown` is the mean of the picture, if there is one yet.
-    fn estimate(&self, mean_shown: Option<f64>) -> Option<ErrorEstimate> {
-        ErrorEstimate::of(&self.parts, Measure::Rmse, mean_shown, self.rays)
     }
 }
