@@ -50,14 +50,17 @@ impl MemoryEstimate {
         }
     }
 
-    /// The acceleration structure of a backend, while it is built.
-    pub fn building(&self, backend: BackendChoice) -> u64 {
+    /// The acceleration structure of a backend.
+    pub fn structure(&self, backend: BackendChoice) -> Footprint {
+        let Self { embree, bvh, .. } = *self;
         match backend {
-            BackendChoice::Embree => self.embree.building,
-            BackendChoice::Bvh => self.bvh.building,
+            BackendChoice::Embree => embree,
+            BackendChoice::Bvh => bvh,
             // Which one it will be shows when Embree is looked for: the larger is safe.
-            BackendChoice::Auto => self.embree.building.max(self.bvh.building),
-            BackendChoice::BruteForce => 0,
+            BackendChoice::Auto => {
+                Footprint { built: embree.built.max(bvh.built), building: embree.building.max(bvh.building) }
+            }
+            BackendChoice::BruteForce => Footprint { built: 0, building: 0 },
         }
     }
 }
@@ -109,7 +112,8 @@ fn mebibytes(bytes: u64) -> u64 {
     bytes.div_ceil(1 << 20)
 }
 
-/// Refuses a scene that exceeds a limit, if there is one, with the acceleration structures of all these backends.
+/// Refuses a scene that exceeds a limit, if there is one, with the acceleration structures of all these backends. Returns what the limit leaves once they
+/// are built.
 ///
 /// # Errors
 /// [`MemoryLimitError`] with the estimate.
@@ -117,14 +121,17 @@ pub fn check_memory(
     scene: &Scene,
     backends: &[BackendChoice],
     limit: Option<u64>,
-) -> Result<(), MemoryLimitError> {
+) -> Result<Option<u64>, MemoryLimitError> {
     let estimate = MemoryEstimate::of(scene);
-    let structure = backends.iter().map(|backend| estimate.building(*backend)).sum();
+    let structures = || backends.iter().map(|backend| estimate.structure(*backend));
+    let structure = structures().map(|structure| structure.building).sum();
     let needed = estimate.scene + structure;
-    match limit {
-        Some(limit) if needed > limit => Err(MemoryLimitError { needed, structure, limit }),
-        _ => Ok(()),
+    let Some(limit) = limit else { return Ok(None) };
+    if needed > limit {
+        return Err(MemoryLimitError { needed, structure, limit });
     }
+    let built: u64 = structures().map(|structure| structure.built).sum();
+    Ok(Some(limit - estimate.scene - built.min(structure)))
 }
 
 #[cfg(test)]

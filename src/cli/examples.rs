@@ -42,6 +42,10 @@ const EXAMPLES: &[(&[&str], &[Example])] = &[
                 "a quick look",
             ),
             example(
+                "lightmesh render scene.toml -o soft.png --shadows soft --memory-limit 2G",
+                "soft shadows, as good as the memory allows",
+            ),
+            example(
                 "lightmesh render scene.toml -o truth.exr --integrator conventional",
                 "what the light mesh is to be compared with",
             ),

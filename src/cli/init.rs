@@ -15,7 +15,7 @@ use crate::render::render;
 use crate::scene::load::scene_file::FalloffName;
 use crate::scene::load::{ModelFormat, OpenedScene, load_model};
 use crate::scene::{Camera, Light, LightKind};
-use crate::settings::{Integrator, Radius, Resolve};
+use crate::settings::{Integrator, Radius, Shadows};
 
 /// What `init` takes.
 #[derive(Args, Debug)]
@@ -127,8 +127,11 @@ fn scene_file(
     if let Radius::Spacings(radius) = loaded.settings.shading.kernel.radius {
         line(format!("radius_in_spacings = {radius:?}"));
     }
-    line("# Where mesh points disagree about a light, a shadow ray decides: sharp shadows.".to_owned());
-    line(format!("resolve = \"{}\"", Resolve::Trace));
+    line(format!(
+        "# Where mesh points disagree about a light, a shadow ray decides; \"{}\" shadows blur over the radius.",
+        Shadows::Soft
+    ));
+    line(format!("shadows = \"{}\"", Shadows::Sharp));
     if let Some(indirect) = &loaded.settings.mesh.indirect {
         line("\n# Light from surfaces, bounce after bounce; without this table there is none.".to_owned());
         line(format!("[light_mesh.indirect]\nbounces = {}", indirect.bounces));

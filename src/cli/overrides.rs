@@ -5,8 +5,8 @@ use clap::Args;
 use super::choice::named;
 use super::parse::{self, Bounces, TimeLimit};
 use crate::settings::{
-    Estimator, Integrator, Limits, Neighbourhood, PixelFilter, PointSettings, Radius, Resolve, Settings,
-    Spacing,
+    Estimator, Integrator, Neighbourhood, PixelFilter, PointSettings, Radius, Resolve, Settings, Shadows,
+    Spacing, Steps,
 };
 
 /// Settings of the scene file that flags can override.
@@ -25,7 +25,10 @@ pub struct Overrides {
     /// Which mesh points a surface point takes
     #[arg(long, value_parser = named::<Neighbourhood>())]
     neighbourhood: Option<Neighbourhood>,
-    /// What per-light does where mesh points disagree
+    /// Shadows that blur over the neighbourhood of a surface point, or such as the lamps cast
+    #[arg(long, value_parser = named::<Shadows>(), conflicts_with = "resolve")]
+    shadows: Option<Shadows>,
+    /// What per-light does where mesh points disagree: the same as --shadows, in the method's words
     #[arg(long, value_parser = named::<Resolve>())]
     resolve: Option<Resolve>,
     /// With traced shadow edges: what all rays that are spared may cost, as a share of a pixel's light
@@ -62,7 +65,7 @@ pub struct Overrides {
     #[arg(long, value_name = "TIME", value_parser = parse::time_limit)]
     time_limit: Option<TimeLimit>,
     /// Whole pictures to make one after the other, each better than the one before
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Limits::MOST_STEPS)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Steps::MOST)))]
     steps: Option<u32>,
     /// Brightness of PNG images in stops
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = parse::exposure)]
@@ -104,7 +107,7 @@ impl Overrides {
         set(&mut shading.integrator, self.integrator);
         set(&mut shading.reference_samples, self.reference_samples);
         set(&mut shading.estimator, self.estimator);
-        set(&mut shading.resolve, self.resolve);
+        set(&mut shading.resolve, self.shadows.map(Resolve::from).or(self.resolve));
         set(&mut shading.tolerance, self.tolerance);
         set(&mut shading.kernel.neighbourhood, self.neighbourhood);
         set(&mut shading.kernel.radius, self.radius);
@@ -118,7 +121,7 @@ impl Overrides {
         limits.max_error = self.max_error.or(limits.max_error);
         limits.estimator_open &= self.estimator.is_none();
         set(&mut limits.time, self.time_limit.map(|limit| limit.0));
-        set(&mut limits.steps, self.steps);
+        set(&mut limits.steps, self.steps.map(Steps::Count));
     }
 }
 

@@ -52,7 +52,8 @@ pub fn ready_scene(
 
     let stage = Instant::now();
     let spinner = reporter.spinner("building");
-    memory.check(args, &opened.loaded.scene, &[backend.backend])?;
+    let left = memory.check(args, &opened.loaded.scene, &[backend.backend])?;
+    opened.loaded.settings.limits.memory = left;
     let chosen = Backend::build(backend.backend, &opened.loaded.scene)?;
     spinner.finish_and_clear();
     if let Some(notice) = &chosen.notice {

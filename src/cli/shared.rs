@@ -99,22 +99,22 @@ pub struct BackendArgs {
     pub backend: BackendChoice,
 }
 
-/// How much memory a scene may take.
+/// How much memory a scene and its light meshes may take.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct MemoryArgs {
-    /// Refuse a scene that would take more memory while it is built, by an estimate: 500M, 8G
+    /// Refuse a scene that would take more memory while it is built, by an estimate, and light meshes that would take more than it leaves: 500M, 8G
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     memory_limit: Option<u64>,
 }
 
 impl MemoryArgs {
-    /// Refuses a scene that takes more than the limit.
+    /// Refuses a scene that takes more than the limit; returns what that leaves for light meshes, if there is one.
     pub fn check(
         self,
         file: &SceneArgs,
         scene: &Scene,
         backends: &[BackendChoice],
-    ) -> Result<(), CommandError> {
+    ) -> Result<Option<u64>, CommandError> {
         check_memory(scene, backends, self.memory_limit)
             .map_err(|source| CommandError::MemoryLimit { scene: file.path.clone(), source })
     }

@@ -50,6 +50,8 @@ pub enum Ending {
     Time,
     /// Every shadow ray was traced: there is no error but that of pixels' samples.
     Exact,
+    /// A finer light mesh would take more memory than it may.
+    Memory,
 }
 
 /// How wrong a picture is, and why it was left at that.
@@ -206,6 +208,8 @@ impl fmt::Display for Accuracy {
             Ending::Finest => write!(f, "; asked for {asked} %, but no finer mesh is tried")?,
             Ending::Time if self.asked == 0.0 => f.write_str("; the time limit ended it")?,
             Ending::Time => write!(f, "; the time limit ended it, {asked} % were asked for")?,
+            Ending::Memory if self.asked == 0.0 => f.write_str("; the memory limit ended it")?,
+            Ending::Memory => write!(f, "; the memory limit ended it, {asked} % were asked for")?,
             Ending::Exact => {}
         }
         match self.rays_for_half {

@@ -44,6 +44,13 @@ const HYBRID_RAY: f32 = 1.0;
 /// What a light mesh has to save, as a share of conventional shading: who is level is exact, and the estimate is one.
 const LEAST_SAVED: f32 = 0.1;
 
+/// Whether settings ask for nothing that only a light mesh gives.
+pub(super) fn is_open(settings: &Settings) -> bool {
+    // Light from points on surfaces goes with either.
+    let in_space = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
+    settings.shading.is_hybrid() && !settings.mesh.indirect.as_ref().is_some_and(in_space)
+}
+
 /// Takes an integrator for a frame.
 ///
 /// # Errors
@@ -56,10 +63,7 @@ pub(super) fn choose<A: Accel>(
     stats: &mut RenderStats,
 ) -> Result<Choice, RenderError> {
     let shading = &settings.shading;
-    let traced = shading.is_hybrid();
-    // Light from points on surfaces goes with either.
-    let in_space = |indirect: &IndirectSettings| indirect.form != IndirectForm::Surface;
-    if !traced || settings.mesh.indirect.as_ref().is_some_and(in_space) {
+    if !is_open(settings) {
         return Ok(Choice { integrator: Integrator::LightMesh, reason: Reason::Settings });
     }
     let by_lights = |integrator, lights| Ok(Choice { integrator, reason: Reason::Lights(lights) });

@@ -42,6 +42,14 @@ pub enum RenderError {
     /// The image can't be held.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// The light meshes would take more memory than the settings allow them.
+    #[error("light meshes would take {} MiB or more; the memory limit leaves them {} MiB", needed.div_ceil(1 << 20), limit >> 20)]
+    Memory {
+        /// Bytes that they would take.
+        needed: u64,
+        /// Bytes that they may take.
+        limit: u64,
+    },
     /// A [`StopToken`](super::StopToken) stopped the render.
     #[error("the render was stopped")]
     Stopped,

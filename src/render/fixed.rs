@@ -1,14 +1,16 @@
 //! One picture, by settings that leave nothing open.
 
-use super::choice::choose;
+use super::choice::{choose, is_open};
 use super::error::RenderError;
 use super::film::TileSink;
 use super::frame::{Frame, Purpose, StopToken};
 use super::integrators::{ConventionalIntegrator, LightMeshIntegrator, ReferenceIntegrator};
 use super::known_view::KnownView;
 use super::layers::LayerCollector;
+use super::memory::{NeededMemory, within};
 use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
+use super::reason::{Choice, Reason};
 use super::settled::Settled;
 use super::stats::{RenderStats, timed};
 use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
@@ -60,13 +62,27 @@ fn render_frame<A: Accel>(
     let camera = view.camera;
     let mut stats = RenderStats::default();
     let world = frame.world;
-    let integrator = match settings.shading.integrator {
-        Integrator::Auto => {
-            let choice = choose(&frame, camera, settings, meshes, &mut stats)?;
+    let limit = settings.limits.memory;
+    let may_be_mesh = matches!(settings.shading.integrator, Integrator::LightMesh | Integrator::Auto);
+    let mut needed = None;
+    let mut fits = Ok(());
+    if limit.is_some() && may_be_mesh {
+        let interpolation = meshes.interpolation(world.scene, camera, settings)?;
+        needed = NeededMemory::of(&mut frame, settings, meshes, &interpolation, &mut stats)?;
+        fits = needed.iter().try_for_each(|needed| needed.check(world.lights, meshes, &interpolation));
+    }
+    let integrator = match (settings.shading.integrator, fits) {
+        (Integrator::Auto, fits) => {
+            let choice = match fits {
+                Err(RenderError::Memory { .. }) if is_open(settings) => {
+                    Choice { integrator: Integrator::Conventional, reason: Reason::Memory }
+                }
+                fits => fits.and_then(|()| choose(&frame, camera, settings, meshes, &mut stats))?,
+            };
             stats.choice = Some(choice);
             choice.integrator
         }
-        named => named,
+        (named, fits) => fits.map(|()| named)?,
     };
     stats.integrator = Some(integrator);
     let settled = Settled::of(integrator, settings);
@@ -84,6 +100,14 @@ fn render_frame<A: Accel>(
     if let Some(mesh) = &mut meshes.surface {
         let known = view.known.map(|known| &known.records[..]).filter(|known| !known.is_empty());
         evaluate_surface_light(&mut frame, mesh, camera, known, &mut stats)?;
+    }
+    // What light from surfaces takes is known by now.
+    match (&needed, &interpolation) {
+        (Some(needed), Some(interpolation)) => {
+            needed.check(world.lights, meshes, interpolation)?;
+            needed.reserve(world.lights, meshes, interpolation);
+        }
+        _ => limit.map_or(Ok(()), |limit| within(limit, meshes.memory_bytes()))?,
     }
     let surface = meshes.surface.as_ref().map(|mesh| SurfaceLight::new(world.accel, mesh, settings));
     let image = match (integrator, interpolation) {

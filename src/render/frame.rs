@@ -174,7 +174,11 @@ impl<'a, A: Accel> Frame<'a, A> {
         let samples = u64::from(width) * u64::from(height) * u64::from(self.view.samples_per_pixel);
         let keep = samples <= KEPT_SAMPLES;
         let mut paths = Vec::new();
-        for block in &self.blocks {
+        for (index, block) in self.blocks.iter().enumerate() {
+            if let Some(traced) = self.kept.get(index) {
+                each(traced, stats);
+                continue;
+            }
             self.trace(block, &mut paths, stats)?;
             each(&paths, stats);
             if keep {

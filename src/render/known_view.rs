@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::accuracy::{Accuracy, Ending};
+use super::reason::Reason;
 use super::settled::Settled;
 use super::stats::RenderStats;
 use crate::scene::{Camera, Fingerprint};
@@ -25,7 +26,7 @@ pub(super) struct KnownView {
 }
 
 impl KnownView {
-    /// A view that was rendered; `None` if it might have been better with more time.
+    /// A view that was rendered; `None` if it might have been better with more time or memory.
     pub fn of(
         camera: &Camera,
         settings: &Settings,
@@ -33,7 +34,9 @@ impl KnownView {
         records: Vec<(u32, u32)>,
     ) -> Option<Self> {
         let accuracy = stats.accuracy;
-        let is_whole = accuracy.is_none_or(|accuracy| accuracy.ending != Ending::Time);
+        let by_memory = stats.choice.is_some_and(|choice| choice.reason == Reason::Memory);
+        let is_cut = |accuracy: Accuracy| matches!(accuracy.ending, Ending::Time | Ending::Memory);
+        let is_whole = !by_memory && !accuracy.is_some_and(is_cut);
         let identity = identity(camera, settings);
         let known = |settled| Self { of_file: false, identity, settled, accuracy, records };
         stats.settled.filter(|_| is_whole).map(known)
@@ -44,16 +47,17 @@ fn yes() -> bool {
     true
 }
 
-/// What makes two views the same: all but which part of them is rendered and how it is written.
+/// What makes two views the same: all but which part of them is rendered, how it is written and how much memory there is for that.
 pub(super) fn identity(camera: &Camera, settings: &Settings) -> Fingerprint {
     Fingerprint::of(&(camera, of_views(settings)))
 }
 
-/// The settings without which part of a view is rendered and how it is written.
+/// The settings without which part of a view is rendered, how it is written and how much memory there is for that.
 pub(super) fn of_views(settings: &Settings) -> Settings {
     let mut settings = settings.clone();
     settings.view.crop = None;
     settings.view.block_samples = None;
+    settings.limits.memory = None;
     settings.output = OutputSettings::default();
     settings
 }

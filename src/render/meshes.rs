@@ -209,6 +209,11 @@ impl LightMeshes {
         })
     }
 
+    /// Forgets the mesh by which errors are measured, where memory is short: it is found again as it was.
+    pub(super) fn forget_other(&mut self) {
+        self.other = DirectMesh::shifted(self.direct.store().points.bounds(), SHIFT);
+    }
+
     /// Takes the meshes of indirect light away, to be [put back](Self::put_indirect_back).
     pub(super) fn set_indirect_aside(&mut self) -> IndirectLight {
         IndirectLight {

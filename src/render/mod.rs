@@ -15,6 +15,7 @@ pub mod integrators;
 mod known_view;
 mod layers;
 mod measured;
+mod memory;
 mod merge;
 mod mesh_file;
 mod meshes;

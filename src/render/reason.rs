@@ -27,6 +27,8 @@ pub enum Reason {
     Trial(f32),
     /// By trial: the share of the light that the light mesh is estimated to get wrong exceeds the tolerance.
     Mistaken(f32),
+    /// A light mesh would take more memory than the limit leaves it.
+    Memory,
 }
 
 impl fmt::Display for Choice {
@@ -38,6 +40,7 @@ impl fmt::Display for Choice {
             Reason::Trial(share) => {
                 write!(f, "a light mesh is estimated at {:.0} % of conventional shading", 100.0 * share)
             }
+            Reason::Memory => f.write_str("a light mesh would exceed the memory limit"),
             Reason::Mistaken(share) => {
                 write!(f, "a light mesh is estimated to get {:.1} % of the light wrong", 100.0 * share)
             }

@@ -10,6 +10,7 @@ use super::fixed::View;
 use super::frame::{Purpose, StopToken};
 use super::known_view::of_views;
 use super::layers::LayerCollector;
+use super::memory::within;
 use super::mesh_file::{MeshScene, RestoredMeshes, WriteMeshesError};
 use super::meshes::LightMeshes;
 use super::scene_lights::SceneLights;
@@ -243,6 +244,10 @@ impl Session {
         for part in interpolation.neighbourhoods.parts_of(bounds) {
             stop.check()?;
             let needed = meshes.direct.points_in(&interpolation, part);
+            if let Some(limit) = settings.limits.memory {
+                let direct = meshes.direct.bytes_with(world.lights, &interpolation, &needed);
+                within(limit, meshes.memory_bytes() - meshes.direct.memory_bytes() + direct)?;
+            }
             evaluation.add(meshes.direct.evaluate(world, &interpolation, &needed));
         }
         Ok(evaluation)

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::settings::{Estimator, Integrator, LayoutName, PointLayout, Radius, Settings, Spacing};
+use crate::settings::{Estimator, Integrator, LayoutName, PointLayout, Radius, Settings, Spacing, Steps};
 
 /// The settings that a render may choose by itself, as one of its pictures has them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,7 @@ impl Settled {
     pub(super) fn settings(&self, asked: &Settings) -> Settings {
         let mut settings = asked.clone();
         settings.limits.max_error = None;
-        (settings.limits.steps, settings.limits.time) = (1, None);
+        (settings.limits.steps, settings.limits.time) = (Steps::Count(1), None);
         settings.shading.integrator = self.integrator;
         settings.shading.tolerance = self.tolerance;
         self.choose_mesh(&mut settings);

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::accuracy::{Accuracy, Ending};
+use super::accuracy::Accuracy;
 use super::error::RenderError;
 use super::fixed::View;
 use super::frame::Purpose;
@@ -11,7 +11,9 @@ use super::meshes::LightMeshes;
 use super::stats::RenderStats;
 use crate::accel::Accel;
 use crate::image::Image;
-use crate::settings::{Integrator, Leaks, Neighbourhood, PointLayout, Radius, Resolve, Settings, Spacing};
+use crate::settings::{
+    Integrator, Leaks, Neighbourhood, PointLayout, Radius, Resolve, Settings, Spacing, Step, Steps,
+};
 
 impl<A: Accel> View<'_, A> {
     /// Renders as the limits of the settings ask for.
@@ -25,14 +27,19 @@ impl<A: Accel> View<'_, A> {
     ) -> Result<(Image, RenderStats), RenderError> {
         // Before anything is tried: bits belong to the lights that they are of.
         meshes.renew_lights(self.world.lights);
-        let limits = settings.limits;
+        let limits = &settings.limits;
         let whole = (!self.is_local(settings)).then(|| self.whole(settings));
-        let settings = whole.as_ref().unwrap_or(settings);
         let purpose = if whole.is_some() { Purpose::Image } else { self.purpose };
         let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
+        let list = match &limits.steps {
+            Steps::List(list) => &list[..],
+            Steps::Count(_) => &[],
+        };
+        let steps = limits.steps.pictures();
         // Who is short of time needs a first picture soon.
-        let steps = if deadline.is_some() { limits.steps.max(2) } else { limits.steps };
+        let steps = if deadline.is_some() { steps.max(2) } else { steps };
         let asked = limits.max_error.unwrap_or(0.0);
+        let settings = whole.as_ref().unwrap_or(settings);
         let mut best: Option<(Image, RenderStats)> = None;
         for step in 1..=steps {
             let last = step == steps;
@@ -44,7 +51,10 @@ impl<A: Accel> View<'_, A> {
             } else {
                 // Indirect light isn't shown yet; what is known of it stays for the last picture.
                 let indirect = meshes.set_indirect_aside();
-                let coarse = view.coarser(settings, steps - step, step == 1, meshes);
+                let coarse = match list.get(step as usize - 1) {
+                    Some(listed) => Ok(by_step(settings, listed)),
+                    None => view.coarser(settings, steps - step, step == 1, meshes),
+                };
                 let rendered = coarse.and_then(|coarse| view.render_fixed(&coarse, meshes));
                 meshes.put_indirect_back(indirect);
                 rendered
@@ -57,12 +67,12 @@ impl<A: Accel> View<'_, A> {
                     self.sink.picture(&image);
                     best = Some((image, stats));
                 }
-                (Err(RenderError::Stopped), Some((image, mut stats))) if stop.is_late() => {
-                    stats.accuracy =
-                        Some(Accuracy { asked, found: None, ending: Ending::Time, rays_for_half: None });
+                (Err(error), Some((image, mut stats))) => {
+                    let Some(ending) = view.ending_of(&error) else { return Err(error) };
+                    stats.accuracy = Some(Accuracy { asked, found: None, ending, rays_for_half: None });
                     return Ok((image, stats));
                 }
-                (Err(error), _) => return Err(error),
+                (Err(error), None) => return Err(error),
             }
         }
         best.ok_or(RenderError::Stopped)
@@ -70,8 +80,8 @@ impl<A: Accel> View<'_, A> {
 
     /// Whether part of a picture can be made without the rest of it: where nothing is measured, which takes all of it.
     fn is_local(&self, settings: &Settings) -> bool {
-        let limits = settings.limits;
-        limits.steps == 1
+        let limits = &settings.limits;
+        limits.steps.pictures() == 1
             && limits.time.is_none()
             && !self.is_measured(settings, limits.max_error.unwrap_or(0.0))
     }
@@ -83,8 +93,7 @@ impl<A: Accel> View<'_, A> {
         settings
     }
 
-    /// Settings of a picture that comes some steps before the last: mesh points as often twice as far apart, shadows without edges of their
-    /// own, no light from surfaces.
+    /// Settings of a picture that comes some steps before the last: mesh points as often twice as far apart.
     fn coarser(
         &self,
         settings: &Settings,
@@ -92,16 +101,9 @@ impl<A: Accel> View<'_, A> {
         is_first: bool,
         meshes: &mut LightMeshes,
     ) -> Result<Settings, RenderError> {
-        let mut settings = settings.clone();
-        settings.mesh.indirect = None;
-        let shading = &mut settings.shading;
-        if shading.integrator != Integrator::Reference {
-            shading.integrator = Integrator::LightMesh;
-        }
-        shading.resolve = Resolve::Average;
-        shading.kernel.leaks = Leaks::Allow;
+        let mut settings = on_the_way(settings);
         if is_first {
-            shading.kernel.neighbourhood = Neighbourhood::Nearest;
+            settings.shading.kernel.neighbourhood = Neighbourhood::Nearest;
         }
         if matches!(settings.mesh.direct.layout, PointLayout::List(_)) {
             return Ok(settings);
@@ -114,4 +116,33 @@ impl<A: Accel> View<'_, A> {
         settings.mesh.direct.regions.clear();
         Ok(settings)
     }
+}
+
+/// Settings of any picture before the last: shadows without edges of their own, no light from surfaces.
+fn on_the_way(settings: &Settings) -> Settings {
+    let mut settings = settings.clone();
+    settings.mesh.indirect = None;
+    let shading = &mut settings.shading;
+    if shading.integrator != Integrator::Reference {
+        shading.integrator = Integrator::LightMesh;
+    }
+    shading.resolve = Resolve::Average;
+    shading.kernel.leaks = Leaks::Allow;
+    settings
+}
+
+/// Settings of a picture before the last that a list describes.
+fn by_step(settings: &Settings, step: &Step) -> Settings {
+    let mut settings = on_the_way(settings);
+    let Settings { mesh, shading, .. } = &mut settings;
+    if let Some(spacing) = step.spacing {
+        mesh.direct.spacing = Spacing::Units(spacing);
+        // Boxes with finer points of their own would make a coarse picture a slow one.
+        mesh.direct.regions.clear();
+    }
+    if let Some(radius) = step.radius {
+        shading.kernel.radius = Radius::Units(radius);
+    }
+    shading.kernel.neighbourhood = step.neighbourhood.unwrap_or(shading.kernel.neighbourhood);
+    settings
 }

@@ -1,6 +1,6 @@
 //! What settings made in memory must fulfil; those of scene files and flags are checked where they are read.
 
-use super::limits::Limits;
+use super::limits::Steps;
 use super::mesh::{PointLayout, PointSettings, Spacing};
 use super::settings::Settings;
 use super::shading::Radius;
@@ -69,8 +69,17 @@ impl Settings {
         if let Some(error) = limits.max_error {
             check("limits.max_error", "be a number from 0 up", error, error >= 0.0 && error.is_finite())?;
         }
-        let steps = limits.steps;
-        check("limits.steps", "lie in 1 to 8", steps, (1..=Limits::MOST_STEPS).contains(&steps))?;
+        let steps = &limits.steps;
+        let holds = (1..=Steps::MOST).contains(&steps.pictures());
+        check("limits.steps", "make 1 to 8 pictures", steps, holds)?;
+        if let Steps::List(list) = steps {
+            for step in list {
+                let spacing =
+                    step.spacing.is_none_or(|spacing| spacing.to_array().into_iter().all(is_length));
+                let holds = spacing && step.radius.is_none_or(is_length);
+                check("limits.steps", "have lengths that are finite and above 0", step, holds)?;
+            }
+        }
         mesh.direct.check()?;
         if let Some(indirect) = &mesh.indirect {
             radius("shading.indirect.kernel.radius", shading.indirect.kernel.radius)?;
@@ -113,7 +122,7 @@ impl PointSettings {
 mod tests {
     use super::*;
     use crate::image::Window;
-    use crate::settings::IndirectSettings;
+    use crate::settings::{IndirectSettings, Step};
     use glam::Vec3;
 
     /// Every kind of value that would make a render impossible is an error that names it.
@@ -135,7 +144,10 @@ mod tests {
         assert_eq!(refused(&|s| s.shading.tolerance = -0.01), "shading.tolerance");
         assert_eq!(refused(&|s| s.shading.kernel.radius = Radius::Units(f32::NAN)), "shading.kernel.radius");
         assert_eq!(refused(&|s| s.limits.max_error = Some(f32::NAN)), "limits.max_error");
-        assert_eq!(refused(&|s| s.limits.steps = 0), "limits.steps");
+        assert_eq!(refused(&|s| s.limits.steps = Steps::Count(0)), "limits.steps");
+        assert_eq!(refused(&|s| s.limits.steps = Steps::List(vec![Step::default(); 8])), "limits.steps");
+        let flat = Step { spacing: Some(Vec3::X), ..Step::default() };
+        assert_eq!(refused(&|s| s.limits.steps = Steps::List(vec![flat])), "limits.steps");
         assert_eq!(refused(&|s| s.mesh.direct.spacing = Spacing::Units(Vec3::ZERO)), "points.spacing");
         assert_eq!(
             refused(&|s| s.mesh.direct.layout = PointLayout::List(Vec::new().into())),

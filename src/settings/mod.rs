@@ -14,7 +14,7 @@ mod shading;
 mod view;
 
 pub use check::SettingsError;
-pub use limits::Limits;
+pub use limits::{Limits, Step, Steps};
 pub use mesh::{
     IndirectForm, IndirectSettings, LayoutName, MeshSettings, PointLayout, PointSettings, Region, Spacing,
 };
@@ -23,7 +23,7 @@ pub use output::{MAX_EXPOSURE, OutputSettings};
 pub use settings::Settings;
 pub use shading::{
     Estimator, IndirectShading, Integrator, KernelSettings, Leaks, Neighbourhood, Normalization, Radius,
-    Resolve, ShadingSettings,
+    Resolve, ShadingSettings, Shadows,
 };
 pub use view::{MAX_FILTER_WIDTH, PixelFilter, ViewSettings};
 

@@ -165,6 +165,25 @@ named_enum! {
 }
 
 named_enum! {
+    /// Shadows as they look: the words for [`Resolve`] that scene files and flags have beside its own, since who renders thinks of pictures.
+    pub enum Shadows {
+        /// Of softness R: the mean of what mesh points see
+        Soft = "soft",
+        /// As sharp as the sizes of the lamps make them: occlusion rays from surface points
+        Sharp = "sharp",
+    }
+}
+
+impl From<Shadows> for Resolve {
+    fn from(shadows: Shadows) -> Self {
+        match shadows {
+            Shadows::Soft => Self::Average,
+            Shadows::Sharp => Self::Trace,
+        }
+    }
+}
+
+named_enum! {
     /// Scale of IndirectLight.
     pub enum Normalization {
         /// Mean over directions: the integral of eq. (4) over 4π

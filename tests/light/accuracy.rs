@@ -5,10 +5,15 @@ use std::time::Duration;
 use glam::Vec3;
 use lightmesh::image::Image;
 use lightmesh::image::metrics::{MetricsOptions, compare};
-use lightmesh::render::{Ending, Measure, RenderStats, Session, StopToken, Tile, TileSink};
+use lightmesh::render::{
+    Ending, Measure, Reason, RenderError, RenderStats, Session, StopToken, Tile, TileSink,
+};
 use lightmesh::scene::Camera;
 use lightmesh::scene::load::LoadedScene;
-use lightmesh::settings::{Integrator, Leaks, Limits, Neighbourhood, Radius, Resolve, Settings, Spacing};
+use lightmesh::settings::{
+    IndirectSettings, Integrator, Leaks, Limits, Neighbourhood, Radius, Resolve, Settings, Spacing, Step,
+    Steps,
+};
 use std::sync::Mutex;
 
 use crate::common::{bits, forest, picture, session, settings_at};
@@ -209,7 +214,7 @@ fn steps_end_with_the_picture_of_one_step() {
     let scene = scene();
     let mut settings = settings(0.05);
     let (alone, _) = rendered(&scene, &settings);
-    settings.limits.steps = 3;
+    settings.limits.steps = Steps::Count(3);
     let watch = Watch::default();
     let mut session = session(&scene.scene);
     let (image, stats) =
@@ -219,6 +224,47 @@ fn steps_end_with_the_picture_of_one_step() {
     assert!(pictures[2] == bits(&image) && bits(&image) == bits(&alone));
     assert!(pictures[0] != pictures[1] && pictures[1] != pictures[2]);
     assert_eq!(stats.rays.camera, 3 * 64 * 48);
+}
+
+/// A listed step is the picture that a render by its lengths would make, without shadow edges and without light from surfaces; what it leaves out is as in the
+/// settings, and the last picture is theirs.
+#[test]
+fn listed_steps_are_the_pictures_that_they_describe() {
+    let scene = scene();
+    let mut settings = settings_at((64, 48));
+    settings.shading.integrator = Integrator::LightMesh;
+    settings.shading.resolve = Resolve::Trace;
+    settings.shading.kernel.radius = Radius::Spacings(2.0);
+    settings.mesh.indirect = Some(IndirectSettings { directions: 8, ..IndirectSettings::default() });
+    let (alone, _) = rendered(&scene, &settings);
+    let step = |spacing: f32, radius, neighbourhood| Step {
+        spacing: Some(Vec3::splat(spacing)),
+        radius,
+        neighbourhood,
+    };
+    let list = vec![
+        step(2.0, None, Some(Neighbourhood::Nearest)),
+        step(1.0, None, None),
+        step(1.0, Some(1.25), None),
+    ];
+    let expected = list.iter().map(|step| {
+        let mut settings = settings.clone();
+        settings.mesh.indirect = None;
+        settings.shading.resolve = Resolve::Average;
+        settings.shading.kernel.leaks = Leaks::Allow;
+        settings.mesh.direct.spacing = Spacing::Units(step.spacing.unwrap());
+        settings.shading.kernel.radius = step.radius.map_or(Radius::Spacings(2.0), Radius::Units);
+        settings.shading.kernel.neighbourhood = step.neighbourhood.unwrap_or(Neighbourhood::SmoothSphere);
+        bits(&rendered(&scene, &settings).0)
+    });
+    let expected: Vec<Vec<u32>> = expected.chain([bits(&alone)]).collect();
+    settings.limits.steps = Steps::List(list.clone());
+    let watch = Watch::default();
+    let (image, _) = session(&scene.scene)
+        .render_to(&scene.cameras[0], &settings, &watch, &StopToken::default())
+        .expect("an image");
+    let (pictures, _) = watch.0.into_inner().unwrap();
+    assert!(pictures == expected && bits(&image) == bits(&alone));
 }
 
 /// Who has no time gets the first picture, whole, and is told so.
@@ -235,4 +281,88 @@ fn time_ends_a_render_with_a_whole_picture() {
     let (fine, _) = rendered(&scene, &settings);
     let ratio = |image: &Image| image.pixels().iter().flatten().sum::<f32>();
     assert!((ratio(&image) / ratio(&fine) - 1.0).abs() < 0.2, "a rough picture of the same scene");
+}
+
+/// What a limit on memory leaves room for is taken: light meshes stay within it, the picture is as good as that allows and says so, and neither threads nor
+/// blocks show. A limit that is not reached changes nothing.
+#[test]
+fn memory_ends_a_render_with_the_finest_mesh_that_fits() {
+    let scene = scene();
+    let mut settings = settings(0.01);
+    let (free, stats) = rendered(&scene, &settings);
+    let wanted = stats.light_mesh_bytes;
+    let mut errors = Vec::new();
+    let mut endings = Vec::new();
+    for share in [0.4, 0.6, 0.8, 2.0] {
+        settings.limits.memory = Some((share * wanted as f64) as u64);
+        let (image, stats) = rendered(&scene, &settings);
+        assert!(Some(stats.light_mesh_bytes) <= settings.limits.memory, "{share}: {stats:?}");
+        let accuracy = stats.accuracy.expect("measured");
+        errors.push(true_error(&scene, &image, &settings));
+        endings.push(accuracy.ending);
+        let mut blocks = settings.clone();
+        blocks.view.block_samples = Some(1);
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        let (other, counted) = threads.install(|| rendered(&scene, &blocks));
+        assert!(
+            bits(&image) == bits(&other) && counted.light_mesh_bytes == stats.light_mesh_bytes,
+            "{share}"
+        );
+        if share > 1.0 {
+            assert!(bits(&image) == bits(&free));
+        }
+    }
+    assert_eq!((endings[0], endings[3]), (Ending::Memory, Ending::Error));
+    assert!(errors[0] > 0.01 && errors[3] < errors[0], "{errors:?}");
+}
+
+/// Whoever names a mesh gets that one or an error before any of it is evaluated, which says what it would take; or the pictures on the way to it, as far as
+/// memory went.
+#[test]
+fn a_named_mesh_that_does_not_fit_is_refused() {
+    let scene = scene();
+    let mut settings = settings(0.05);
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.2));
+    let (_, stats) = rendered(&scene, &Settings { limits: Limits::default(), ..settings.clone() });
+    let taken = stats.light_mesh_bytes;
+    settings.limits.memory = Some(taken / 2);
+    let mut session = session(&scene.scene);
+    match session.render(&scene.cameras[0], &settings) {
+        // Points at one place are counted twice where they become known together.
+        Err(RenderError::Memory { needed, limit }) => {
+            assert!(
+                limit == taken / 2 && needed >= taken && needed < taken + taken / 4,
+                "{needed} for {taken}"
+            );
+        }
+        other => panic!("{:?}", other.map(|(_, stats)| stats)),
+    }
+    assert!(session.known_points().positions.is_empty());
+
+    settings.limits.steps = Steps::List(vec![Step { spacing: Some(Vec3::splat(0.8)), ..Step::default() }]);
+    let (image, stats) = session.render(&scene.cameras[0], &settings).expect("a rough image");
+    assert_eq!(
+        stats.accuracy.map(|accuracy| (accuracy.ending, accuracy.found)),
+        Some((Ending::Memory, None))
+    );
+    settings.limits = Limits::default();
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.8));
+    assert!(bits(&image) == bits(&rendered(&scene, &settings).0));
+}
+
+/// Sharp shadows need no mesh: where memory has none for it, the conventional tracer makes the picture, which is the same but for its error.
+#[test]
+fn sharp_shadows_are_traced_where_memory_is_short() {
+    let scene = scene();
+    let mut settings = settings(0.05);
+    settings.shading.integrator = Integrator::Auto;
+    settings.shading.resolve = Resolve::Trace;
+    settings.limits.memory = Some(1 << 10);
+    let (image, stats) = rendered(&scene, &settings);
+    assert_eq!(
+        stats.choice.map(|choice| (choice.integrator, choice.reason)),
+        Some((Integrator::Conventional, Reason::Memory))
+    );
+    settings.shading.integrator = Integrator::Conventional;
+    assert!(bits(&image) == bits(&rendered(&scene, &settings).0));
 }

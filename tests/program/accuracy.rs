@@ -16,8 +16,13 @@ const SCENE: &str = "[camera]\nposition = [0, 3, 6]\nlook_at = [0, 0, 0]\n[rende
 
 /// Renders the scene; the statistics and the last line on stderr.
 fn render(folder: &Path, flags: &[&str]) -> (Value, String) {
+    render_scene(folder, SCENE, flags)
+}
+
+/// The same for another scene of that model.
+fn render_scene(folder: &Path, scene: &str, flags: &[&str]) -> (Value, String) {
     fs::write(folder.join("model.obj"), MODEL).expect("writable");
-    fs::write(folder.join("scene.toml"), SCENE).expect("writable");
+    fs::write(folder.join("scene.toml"), scene).expect("writable");
     let output = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
         .args(["render", "scene.toml", "-o", "out.exr", "--stats", "stats.json"])
         .args(flags)
@@ -76,6 +81,61 @@ fn steps_that_are_written_end_with_the_last_one() {
     let alone = picture(&[]);
     let steps = picture(&["--steps", "3", "--write-partial"]);
     assert_eq!(pixels(&alone), pixels(&steps));
+}
+
+/// What a memory limit leaves after the scene is all that light meshes get. A mesh that is named and needs more is an error that names the scene and
+/// leaves no picture; with a picture on the way, that one is left, and the last line says why.
+#[test]
+fn a_memory_limit_bounds_light_meshes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mesh = ["--shadows", "soft", "--spacing", "0.05", "--memory-limit"];
+    let flags = |limit: &'static str| mesh.iter().copied().chain([limit]).collect::<Vec<_>>();
+    render(folder.path(), &flags("1G"));
+    fs::remove_file(folder.path().join("out.exr")).expect("an image");
+    let scene = fs::read_to_string(folder.path().join("scene.toml")).expect("the scene");
+    let refused = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
+        .args(["render", "scene.toml", "-o", "out.exr"])
+        .args(flags("100K"))
+        .current_dir(folder.path())
+        .output()
+        .expect("the program runs");
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{message}");
+    assert!(message.contains("scene.toml: light meshes would take"), "{message}");
+    assert!(!folder.path().join("out.exr").exists());
+
+    let steps = scene.replace("[render]\n", "[render]\nsteps = [{ spacing = 1.5 }]\n");
+    let (stats, last) = render_scene(folder.path(), &steps, &flags("100K"));
+    assert_eq!(stats["accuracy"]["ending"], "memory");
+    assert!(last.contains("the memory limit ended it"), "{last}");
+}
+
+/// The two words for shadows are the two ways of `--resolve`, and more than one word is one too many.
+#[test]
+fn shadows_are_said_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = |flags: &[&str]| {
+        render(folder.path(), &[&["--max-error", "0", "--integrator", "light-mesh"], flags].concat());
+        fs::read(folder.path().join("out.exr")).expect("an image")
+    };
+    let [soft, sharp] = ["soft", "sharp"].map(|word| picture(&["--shadows", word]));
+    assert!(soft == picture(&["--resolve", "average"]) && sharp == picture(&["--resolve", "trace"]));
+    assert!(soft != sharp);
+    let init = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
+        .args(["init", "model.obj", "-o", "new.toml", "--quiet"])
+        .current_dir(folder.path())
+        .status()
+        .expect("the program runs");
+    let new = fs::read_to_string(folder.path().join("new.toml")).expect("a scene file");
+    assert!(init.success() && new.contains("\nshadows = \"sharp\"\n") && !new.contains("resolve"), "{new}");
+    let both = Command::new(env!("CARGO_BIN_EXE_lightmesh"))
+        .args(["render", "scene.toml", "-o", "out.exr", "--shadows", "soft", "--resolve", "trace"])
+        .current_dir(folder.path())
+        .output()
+        .expect("the program runs");
+    let message = String::from_utf8_lossy(&both.stderr);
+    assert_eq!(both.status.code(), Some(2), "{message}");
+    assert!(message.contains("--shadows") && message.contains("--resolve"), "{message}");
 }
 
 /// A limit that can't be meant is refused as wrong usage.

@@ -148,6 +148,7 @@ fn ended(ending: Ending) -> &'static str {
         Ending::Finest => "finest mesh",
         Ending::Time => "time",
         Ending::Exact => "exact",
+        Ending::Memory => "memory",
     }
 }
 

@@ -32,6 +32,15 @@ impl Basis {
             Estimator::Directional => Self::Irradiance,
         }
     }
+
+    /// Numbers that are derived for each mesh point, beside its amount of light.
+    pub(super) fn numbers(self) -> usize {
+        match self {
+            Self::Bits => 0,
+            Self::Light => 6,
+            Self::Irradiance => spherical_harmonics::STRIDE,
+        }
+    }
 }
 
 /// Some numbers per mesh point, by slot, and the amount of light that they stand for.
@@ -57,7 +66,13 @@ impl DerivedValues {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        (self.values.capacity() + self.amounts.capacity()) * size_of::<f32>()
+        (self.values.len() + self.amounts.len()) * size_of::<f32>()
+    }
+
+    /// Makes room for `points` points in all, of some numbers each.
+    pub fn reserve(&mut self, points: usize, numbers: usize) {
+        self.values.reserve_exact((points * numbers).saturating_sub(self.values.len()));
+        self.amounts.reserve_exact(points.saturating_sub(self.amounts.len()));
     }
 
     /// Derives the values of those points that follow the ones that are there.

@@ -108,10 +108,36 @@ impl DirectField {
 
     /// Bytes held.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.bits.memory_bytes()
-            + self.stale.capacity() * size_of::<VisibilityBits>()
+        self.bits.bytes_with(0)
+            + self.stale.len() * size_of::<VisibilityBits>()
             + self.light.memory_bytes()
             + self.irradiance.memory_bytes()
+    }
+
+    /// The same once `known` points have become `all`, of so many chunks of lights, and a basis is derived.
+    pub(super) fn bytes_with(&self, known: usize, all: usize, chunks: usize, basis: Basis) -> usize {
+        let derived = match basis {
+            Basis::Bits => None,
+            Basis::Light => Some(&self.light),
+            Basis::Irradiance => Some(&self.irradiance),
+        };
+        let derived = derived.map_or(0, |held| {
+            (all * (basis.numbers() + 1) * size_of::<f32>()).saturating_sub(held.memory_bytes())
+        });
+        let bits = self.bits.bytes_with((all - known) * chunks) - self.bits.bytes_with(0);
+        self.memory_bytes() + bits + derived
+    }
+
+    /// Makes room for that.
+    pub(super) fn reserve(&mut self, known: usize, all: usize, chunks: usize, basis: Basis) {
+        if all > known {
+            self.bits.to_mut().reserve_exact((all - known) * chunks);
+        }
+        match basis {
+            Basis::Bits => {}
+            Basis::Light => self.light.reserve(all, basis.numbers()),
+            Basis::Irradiance => self.irradiance.reserve(all, basis.numbers()),
+        }
     }
 }
 

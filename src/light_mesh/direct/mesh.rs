@@ -165,7 +165,8 @@ impl DirectMesh {
     pub(crate) fn forget_all(&mut self, lights: &PackedLights) -> KeptBits {
         let points_changed = self.store.positions().len() as u64;
         let bits_forgotten = points_changed * lights.len() as u64;
-        *self = Self::new(self.store.points.bounds());
+        let points = &self.store.points;
+        *self = Self::shifted(points.bounds(), points.shift());
         KeptBits { points_changed, bits_forgotten, ..KeptBits::default() }
     }
 
@@ -194,9 +195,40 @@ impl DirectMesh {
         self.field.forget_derived();
     }
 
-    /// Bytes held by slots and values.
+    /// Bytes of slots and values, without the room that lists keep for more: what the points take, however they became known.
     pub fn memory_bytes(&self) -> usize {
         self.store.memory_bytes() + self.field.memory_bytes()
+    }
+
+    /// The same at most, once some points are [evaluated](Self::evaluate).
+    pub(crate) fn bytes_with(
+        &self,
+        lights: &PackedLights,
+        interpolation: &DirectInterpolation,
+        needed: &PointMask,
+    ) -> usize {
+        let Self { store, field } = self;
+        let growth = store.growth(needed);
+        let known = store.positions().len();
+        let all = known + growth.points;
+        let inside = if interpolation.leaks == Leaks::Invalidate { all - store.inside_len() } else { 0 };
+        let basis = Basis::of(interpolation.estimator);
+        store.bytes_with(growth) + inside + field.bytes_with(known, all, lights.chunks().len(), basis)
+    }
+
+    /// Makes room for that.
+    pub(crate) fn reserve(
+        &mut self,
+        lights: &PackedLights,
+        interpolation: &DirectInterpolation,
+        needed: &PointMask,
+    ) {
+        let Self { store, field } = self;
+        let growth = store.growth(needed);
+        let known = store.positions().len();
+        store.reserve(growth);
+        let basis = Basis::of(interpolation.estimator);
+        field.reserve(known, known + growth.points, lights.chunks().len(), basis);
     }
 }
 

@@ -42,8 +42,9 @@ impl StoredBits {
         &mut self.owned
     }
 
-    /// Bytes of memory that are this program's alone.
-    pub fn memory_bytes(&self) -> usize {
-        self.owned.capacity() * size_of::<VisibilityBits>()
+    /// Bytes of memory that are this program's alone, once `more` are added.
+    pub fn bytes_with(&self, more: usize) -> usize {
+        let all = if more == 0 { self.owned.len() } else { self.as_slice().len() + more };
+        all * size_of::<VisibilityBits>()
     }
 }

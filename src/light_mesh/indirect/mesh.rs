@@ -7,7 +7,7 @@ use super::octahedral::ENTRIES;
 use super::patches::Patches;
 use crate::Bounds;
 use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointSet};
-use crate::light_mesh::store::PointStore;
+use crate::light_mesh::store::{PointMask, PointStore};
 use crate::sampling::SphereStrata;
 use crate::settings::{IndirectForm, IndirectSettings, IndirectShading};
 
@@ -72,11 +72,16 @@ impl IndirectMesh {
         &self.store
     }
 
-    /// Bytes held by slots, values and patches.
+    /// Bytes of slots, values and patches, without the room that lists keep for more.
     pub fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-            + self.patches.memory_bytes()
-            + self.values.capacity() * size_of::<[f32; 3]>()
+        self.store.memory_bytes() + self.patches.memory_bytes() + self.values.len() * size_of::<[f32; 3]>()
+    }
+
+    /// The same once some points have slots and values; which patches they see is not known before.
+    pub(crate) fn bytes_with(&self, needed: &PointMask) -> usize {
+        let growth = self.store.growth(needed);
+        let values = growth.points * self.entries() * size_of::<[f32; 3]>();
+        self.memory_bytes() - self.store.memory_bytes() + self.store.bytes_with(growth) + values
     }
 
     /// The values of the point in a slot.

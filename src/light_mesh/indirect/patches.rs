@@ -204,12 +204,12 @@ impl Patches {
         rays.iter().sum()
     }
 
-    /// Bytes held.
+    /// Bytes held, without the room that lists keep for more.
     pub fn memory_bytes(&self) -> usize {
-        self.cells.cells.capacity() * size_of::<PatchCell>()
-            + self.cells.numbers.capacity() * size_of::<(u64, u32)>()
-            + self.surfaces.capacity() * size_of::<Option<SurfacePoint>>()
-            + self.direct.capacity() * size_of::<Vec3>()
+        self.cells.cells.len() * size_of::<PatchCell>()
+            + self.cells.numbers.len() * size_of::<(u64, u32)>()
+            + self.surfaces.len() * size_of::<Option<SurfacePoint>>()
+            + self.direct.len() * size_of::<Vec3>()
     }
 }
 

@@ -78,6 +78,11 @@ impl PointSet {
         self.bounds
     }
 
+    /// How far points lie from where they usually do, in spacings.
+    pub(crate) fn shift(&self) -> Vec3 {
+        self.shift
+    }
+
     /// Whether points of a layer build on those of a coarser one.
     pub(crate) fn has_levels(&self) -> bool {
         self.layers.iter().any(|layer| layer.parent.is_some())

@@ -19,6 +19,15 @@ impl PointMask {
         Self(all)
     }
 
+    /// Bytes that a light mesh takes for every brick of which points are known, whatever it knows of them: their slots, and a place in a hash map, which has
+    /// a byte beside key and value.
+    pub(crate) const BYTES_OF_BRICK: usize = size_of::<[u32; 64]>() + size_of::<(u64, u32)>() + 1;
+
+    /// Adds the points of another set.
+    pub(crate) fn add(&mut self, other: &Self) {
+        *self = Self::union(self.bricks().chain(other.bricks()));
+    }
+
     /// Bricks in ascending order, each with the bits of its points.
     pub(crate) fn bricks(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
         self.0.iter().copied()

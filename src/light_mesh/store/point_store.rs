@@ -22,6 +22,15 @@ pub struct PointStore {
     inside: Vec<bool>,
 }
 
+/// What becomes known of a light mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Growth {
+    /// Points.
+    pub points: usize,
+    /// Bricks of 64 points that no point was known of.
+    pub bricks: usize,
+}
+
 impl PointStore {
     /// With no point known.
     pub(crate) fn new(points: PointSet) -> Self {
@@ -131,10 +140,40 @@ impl PointStore {
         self.inside.extend(inside);
     }
 
-    /// Bytes held.
+    /// What becomes known with some points, and with the coarser ones that they build on: at most, since points that become known together may share
+    /// slots.
+    pub(crate) fn growth(&self, needed: &PointMask) -> Growth {
+        let Self { points, slots, .. } = self;
+        let mut growth = Growth::default();
+        for (brick, mask) in needed.bricks() {
+            growth.bricks += usize::from(!slots.has_brick(brick));
+            let ids = (0..64).filter(|place| mask >> place & 1 == 1).map(|place| brick * 64 + place);
+            let is_known = |id: u64| slots.slot(id) != UNKNOWN;
+            growth.points += ids.filter(|&id| !is_known(id) && !points.twins(id).any(is_known)).count();
+        }
+        if growth.points > 0 && points.has_levels() {
+            let coarser = self.growth(&self.corners_of(needed));
+            growth.points += coarser.points;
+            growth.bricks += coarser.bricks;
+        }
+        growth
+    }
+
+    /// Makes room for what becomes known, so that lists that grow bit by bit don't take twice as much.
+    pub(crate) fn reserve(&mut self, growth: Growth) {
+        self.slots.reserve(growth.bricks);
+        self.positions.reserve_exact(growth.points);
+    }
+
+    /// Bytes of what is known.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.slots.memory_bytes()
-            + self.positions.capacity() * size_of::<Vec3>()
-            + self.inside.capacity() * size_of::<bool>()
+        self.bytes_with(Growth::default())
+    }
+
+    /// The same once more is known.
+    pub(crate) fn bytes_with(&self, growth: Growth) -> usize {
+        (self.slots.bricks() + growth.bricks) * PointMask::BYTES_OF_BRICK
+            + (self.positions.len() + growth.points) * size_of::<Vec3>()
+            + self.inside.len() * size_of::<bool>()
     }
 }

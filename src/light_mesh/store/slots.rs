@@ -93,11 +93,19 @@ impl SlotTable {
         bricks.iter().flat_map(slots).filter(|(_, slot)| *slot != UNKNOWN).collect()
     }
 
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        // A hash map keeps a byte per place beside key and value.
-        let directory = self.directory.capacity() * (size_of::<(u64, u32)>() + 1);
-        directory + self.bricks.capacity() * 256
+    /// Whether any point of a brick was ever given a slot.
+    pub fn has_brick(&self, brick: u64) -> bool {
+        self.brick(brick) != UNKNOWN
+    }
+
+    /// Number of bricks.
+    pub fn bricks(&self) -> usize {
+        self.bricks.len()
+    }
+
+    /// Makes room for further bricks.
+    pub fn reserve(&mut self, bricks: usize) {
+        self.bricks.reserve_exact(bricks);
     }
 }
 

@@ -272,13 +272,13 @@ impl SurfaceMesh {
         found.or_else(|| self.points.find_own(surface))
     }
 
-    /// Bytes held.
+    /// Bytes held, without the room that lists keep for more.
     pub fn memory_bytes(&self) -> usize {
         self.points.memory_bytes()
-            + self.states.capacity() * size_of::<State>()
-            + (self.indirect.capacity() + self.received.capacity()) * size_of::<Vec3>()
-            + self.list_of.capacity() * size_of::<Range<u32>>()
-            + (self.lists.capacity() + self.records.capacity()) * size_of::<u32>()
+            + self.states.len() * size_of::<State>()
+            + (self.indirect.len() + self.received.len()) * size_of::<Vec3>()
+            + self.list_of.len() * size_of::<Range<u32>>()
+            + (self.lists.len() + self.records.len()) * size_of::<u32>()
     }
 }
 

@@ -376,13 +376,12 @@ impl SurfacePoints {
         best.1
     }
 
-    /// Bytes held.
+    /// Bytes held, without the room that lists keep for more.
     pub fn memory_bytes(&self) -> usize {
-        self.by_cell.capacity() * size_of::<(u64, (u32, u32))>()
-            + self.points.capacity()
-                * (size_of::<CellPoint>() + size_of::<PointSight>() + 2 * size_of::<u32>())
-            + self.levels.capacity()
-            + self.lights.capacity() * size_of::<CellLight>()
+        self.by_cell.len() * size_of::<(u64, (u32, u32))>()
+            + self.points.len() * (size_of::<CellPoint>() + size_of::<PointSight>() + 2 * size_of::<u32>())
+            + self.levels.len()
+            + self.lights.len() * size_of::<CellLight>()
     }
 }
 

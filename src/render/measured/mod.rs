@@ -1,6 +1,8 @@
 //! Pictures as good as they were asked for: what is wrong is measured at parts that are held out (method §10).
 
 mod averaged;
+mod errors;
+mod open_points;
 mod traced;
 
 use super::accuracy::{Accuracy, Ending, ErrorEstimate};
@@ -48,18 +50,27 @@ impl<A: Accel> View<'_, A> {
         }
     }
 
-    /// What was found of a picture that is finished, or that there was no time to find it: the picture is kept all the same.
+    /// What was found of a picture that is finished, or what ended the render before it was: the picture is kept all the same.
     fn or_unmeasured(
         &self,
         found: Result<Option<ErrorEstimate>, RenderError>,
-    ) -> Result<(Option<ErrorEstimate>, bool), RenderError> {
+    ) -> Result<(Option<ErrorEstimate>, Option<Ending>), RenderError> {
         match found {
-            Err(RenderError::Stopped) if self.stop.is_late() => Ok((None, true)),
-            found => Ok((found?, false)),
+            Ok(found) => Ok((found, None)),
+            Err(error) => Ok((None, Some(self.ending_of(&error).ok_or(error)?))),
         }
     }
 
-    /// What was rendered, with what a picture before it took; or that picture, with how wrong it is, if there was no time for another one.
+    /// What ended a render that has a picture already, if that may be shown in place of the one that this error prevented.
+    pub(super) fn ending_of(&self, error: &RenderError) -> Option<Ending> {
+        match error {
+            RenderError::Stopped if self.stop.is_late() => Some(Ending::Time),
+            RenderError::Memory { .. } => Some(Ending::Memory),
+            _ => None,
+        }
+    }
+
+    /// What was rendered, with what a picture before it took; or that picture, with how wrong it is, if there was no time or no memory for another one.
     fn or_before(
         &self,
         rendered: Result<(Image, RenderStats), RenderError>,
@@ -70,11 +81,12 @@ impl<A: Accel> View<'_, A> {
                 stats.add_earlier(&before);
                 Ok((image, stats))
             }
-            (Err(RenderError::Stopped), Some((image, mut stats))) if self.stop.is_late() => {
-                stats.accuracy.iter_mut().for_each(|accuracy| accuracy.ending = Ending::Time);
+            (Err(error), Some((image, mut stats))) => {
+                let ending = self.ending_of(&error).ok_or(error)?;
+                stats.accuracy.iter_mut().for_each(|accuracy| accuracy.ending = ending);
                 Ok((image, stats))
             }
-            (rendered, _) => rendered,
+            (rendered, None) => rendered,
         }
     }
 }

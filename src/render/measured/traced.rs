@@ -65,18 +65,14 @@ impl<A: Accel> View<'_, A> {
                     truth.rays,
                 ))
             });
-            let (found, is_late) = self.or_unmeasured(found)?;
+            let (found, ended) = self.or_unmeasured(found)?;
             stats.seconds.check += seconds;
             let within = found.is_none_or(|found| found.is_within(asked));
             let (width, height) = settings.view.resolution;
             let pixels = f64::from(width) * f64::from(height);
             let per_pixel = |found: ErrorEstimate| found.rays as f64 / found.pixels.max(1) as f64;
             let rays_for_half = found.map(|found| (per_pixel(found) * pixels) as u64);
-            let ending = match within {
-                _ if is_late => Ending::Time,
-                true => Ending::Error,
-                false => Ending::Settings,
-            };
+            let ending = ended.unwrap_or(if within { Ending::Error } else { Ending::Settings });
             stats.accuracy = Some(Accuracy { asked, found, ending, rays_for_half });
             if within || attempt > STRICTER_TIMES || (attempt == STRICTER_TIMES && !may_change) {
                 return Ok((image, stats));

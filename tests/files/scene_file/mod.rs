@@ -10,8 +10,8 @@ use lightmesh::scene::Falloff;
 use lightmesh::scene::load::scene_file::load_scene_text;
 use lightmesh::scene::load::{LoadError, LoadedScene, load_scene_file};
 use lightmesh::settings::{
-    Estimator, IndirectForm, Integrator, Leaks, Neighbourhood, Normalization, PointLayout, Radius, Resolve,
-    Spacing,
+    Estimator, IndirectForm, Integrator, Leaks, Named, Neighbourhood, Normalization, PointLayout, Radius,
+    Resolve, Spacing, Step, Steps,
 };
 use tempfile::TempDir;
 
@@ -112,6 +112,7 @@ fn exactly_the_documented_keys_are_accepted() {
     let text = documentation();
     for heading in [
         "## `[render]`",
+        "### `[[render.steps]]`",
         "## `[camera]`",
         "### `[[camera.keyframes]]`",
         "### `[camera.turntable]`",
@@ -135,7 +136,9 @@ fn exactly_the_documented_keys_are_accepted() {
     assert_eq!(direct, points);
     let mut indirect = documented_keys(&text, "### `[light_mesh.indirect]`");
     // The indirect part documents a `tolerance` of its own.
-    points.retain(|key| !["estimator", "resolve", "tolerance", "levels", "indirect"].contains(&key.as_str()));
+    points.retain(|key| {
+        !["estimator", "shadows", "resolve", "tolerance", "levels", "indirect"].contains(&key.as_str())
+    });
     indirect.extend(points);
     assert_eq!(accepted_keys("[light_mesh.indirect]"), indirect);
     let mut top = documented_keys(&text, "## Top-level keys");
@@ -188,6 +191,18 @@ fn mistakes_name_file_line_and_key() {
         ("falloff = \"none\"\nfalloff_constant = 2", "2: falloff_constant: needs falloff"),
         ("[render]\nspp = 0", "2: render.spp: must lie in [1, 65536], found 0"),
         ("[render]\nspp = \"four\"", "2: render.spp: invalid type"),
+        ("[render]\nsteps = 9", "2: render.steps: must lie in [1, 8], found 9"),
+        ("[render]\nsteps = \"many\"", "2: render.steps: invalid type: string"),
+        (
+            "[[render.steps]]\nspacing = 1\n[[render.steps]]\nspacing = 0",
+            "4: render.steps[1].spacing: must be greater than 0",
+        ),
+        ("[[render.steps]]\nradius = -1", "2: render.steps[0].radius: must be greater than 0"),
+        ("[[render.steps]]\nspaicng = 1", "2: render.steps[0].spaicng: unknown key, did you mean `spacing`?"),
+        (
+            "[render]\nsteps = [{}, {}, {}, {}, {}, {}, {}, {}]",
+            "2: render.steps: must make at most 8 pictures with the last, found 9",
+        ),
         ("[render]\nresolution = [60000, 60000]", "2: render.resolution: 60000 × 60000 is more than"),
         ("[render]\nweight_threshold = 2", "2: render.weight_threshold: must lie in [0, 1], found 2"),
         (
@@ -225,6 +240,11 @@ fn mistakes_name_file_line_and_key() {
         ),
         ("[light_mesh]\ntolerance = -0.01", "2: light_mesh.tolerance: must not be negative, found -0.01"),
         ("[light_mesh]\ntolerance = nan", "2: light_mesh.tolerance: must be a finite"),
+        (
+            "[light_mesh]\nresolve = \"trace\"\nshadows = \"sharp\"",
+            "3: light_mesh.shadows: shadows and resolve exclude each other",
+        ),
+        ("[light_mesh]\nshadows = \"hard\"", "2: light_mesh.shadows: unknown name `hard`"),
         ("[light_mesh]\nlayout_seed = 1", "2: light_mesh.layout_seed: needs layout"),
         ("[light_mesh]\npoints_file = \"none.csv\"", "2: light_mesh.points_file: cannot read"),
         ("[light_mesh.indirect]\nbounces = 0", "2: light_mesh.indirect.bounces: must lie in"),
@@ -283,6 +303,40 @@ fn a_scene_file_that_is_no_text_is_an_error() {
     let directory = load_scene_file(folder.path()).err().expect("a directory").to_string();
     assert!(directory.contains("cannot be read"), "{directory}");
     assert!(load_scene_file(&folder.path().join("none.toml")).is_err());
+}
+
+/// Two ways to say one thing are one setting; the preset's stays where neither is given.
+#[test]
+fn shadows_are_what_resolve_says_in_other_words() {
+    for (shadows, resolve) in [("soft", "average"), ("sharp", "trace")] {
+        let [a, b] = [format!("shadows = \"{shadows}\""), format!("resolve = \"{resolve}\"")]
+            .map(|key| loaded(&format!("preset = \"physical\"\n[light_mesh]\n{key}\n")).settings);
+        assert_eq!(a, b, "{shadows}");
+        assert_eq!(a.shading.resolve.name(), resolve);
+    }
+    assert_eq!(loaded("preset = \"physical\"").settings.shading.resolve, Resolve::Trace);
+}
+
+/// A number of steps, tables and a list of tables all reach the renderer; what a table leaves out is left to the settings.
+#[test]
+fn steps_are_a_number_or_a_list() {
+    let steps = |text: &str| loaded(text).settings.limits.steps;
+    assert_eq!(steps(""), Steps::Count(1));
+    assert_eq!(steps("[render]\nsteps = 8"), Steps::Count(8));
+    assert_eq!(steps("[render]\nsteps = []").pictures(), 1);
+    let listed = Steps::List(vec![
+        Step {
+            spacing: Some(Vec3::new(4.0, 2.0, 4.0)),
+            neighbourhood: Some(Neighbourhood::Nearest),
+            radius: None,
+        },
+        Step { radius: Some(3.0), ..Step::default() },
+    ]);
+    assert_eq!(listed.pictures(), 3);
+    let tables =
+        "[[render.steps]]\nspacing = [4, 2, 4]\nneighbourhood = \"nearest\"\n[[render.steps]]\nradius = 3\n";
+    let list = "[render]\nsteps = [{ spacing = [4, 2, 4], neighbourhood = \"nearest\" }, { radius = 3 }]";
+    assert_eq!((steps(tables), steps(list)), (listed.clone(), listed));
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::values::{Count, NonNegative};
 use crate::scene::load::LoadError;
 use crate::settings::{
     Estimator, IndirectForm, IndirectSettings, IndirectShading, Normalization, PointSettings, Resolve,
-    Settings,
+    Settings, Shadows,
 };
 
 points::point_table! {
@@ -19,6 +19,7 @@ points::point_table! {
     #[derive(Default)]
     pub struct LightMeshTable {
         estimator: Option<Estimator>,
+        shadows: Option<Spanned<Shadows>>,
         resolve: Option<Resolve>,
         tolerance: Option<NonNegative>,
         levels: Option<Count<{ PointSettings::MOST_LEVELS }, 0>>,
@@ -49,7 +50,13 @@ impl LightMeshTable {
         limits.estimator_open = self.estimator.is_none();
         limits.layout_open = self.layout.is_none();
         shading.estimator = self.estimator.unwrap_or(shading.estimator);
-        shading.resolve = self.resolve.unwrap_or(shading.resolve);
+        let shadows = self.shadows.as_ref();
+        if let Some(shadows) = shadows.filter(|_| self.resolve.is_some()) {
+            let problem = "shadows and resolve exclude each other";
+            return Err(places.error(&shadows.span(), "light_mesh.shadows", problem));
+        }
+        let resolve = shadows.map(|shadows| (*shadows.get_ref()).into()).or(self.resolve);
+        shading.resolve = resolve.unwrap_or(shading.resolve);
         shading.tolerance = self.tolerance.map_or(shading.tolerance, |share| share.0);
         // Indirect light follows from direct light unless its table says otherwise.
         if mesh.indirect.is_some() || self.indirect.is_some() {

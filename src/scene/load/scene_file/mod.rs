@@ -12,6 +12,7 @@ mod lights;
 mod place;
 mod points;
 mod render;
+mod steps;
 mod values;
 
 use std::fs;

@@ -6,12 +6,13 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::place::Places;
+use super::steps::StepsKey;
 use super::values::{Count, FilterWidth, Fraction, NonNegative, Stops};
 use crate::image::MAX_PIXELS;
 use crate::scene::Falloff;
 use crate::scene::load::LoadError;
 use crate::settings::{
-    Estimator, IndirectSettings, Integrator, Limits, PixelFilter, Radius, Resolve, Settings, named_enum,
+    Estimator, IndirectSettings, Integrator, PixelFilter, Radius, Resolve, Settings, Steps, named_enum,
 };
 
 /// `[render]`
@@ -30,7 +31,7 @@ pub struct RenderTable {
     lambertian: Option<bool>,
     max_error: Option<Fraction>,
     time_limit: Option<NonNegative>,
-    steps: Option<Count<{ Limits::MOST_STEPS }>>,
+    steps: Option<Spanned<StepsKey>>,
 }
 
 named_enum! {
@@ -78,7 +79,15 @@ impl RenderTable {
         let time =
             |seconds: NonNegative| Duration::try_from_secs_f32(seconds.0).ok().filter(|time| !time.is_zero());
         limits.time = self.time_limit.map_or(limits.time, time);
-        limits.steps = self.steps.map_or(limits.steps, |count| count.0);
+        if let Some(key) = &self.steps {
+            let StepsKey(steps) = key.get_ref();
+            let (most, pictures) = (Steps::MOST, steps.pictures());
+            if pictures > most {
+                let problem = format!("must make at most {most} pictures with the last, found {pictures}");
+                return Err(places.error(&key.span(), "render.steps", problem));
+            }
+            limits.steps.clone_from(steps);
+        }
         shading.integrator = self.integrator.unwrap_or(shading.integrator);
         shading.reference_samples = self.reference_samples.map_or(shading.reference_samples, |count| count.0);
         shading.lambertian = self.lambertian.unwrap_or(shading.lambertian);
