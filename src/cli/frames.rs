@@ -149,8 +149,8 @@ pub fn move_to(
     Ok(frame.camera(index, still))
 }
 
-/// Frames by which a light mesh is chosen for all of an animation.
-const SETTLED_BY: i64 = 4;
+/// Frames by which a light mesh is chosen for all of an animation: from one to the next the error of one mesh differs by half of it.
+const SETTLED_BY: i64 = 8;
 
 /// Chooses once for all frames what the settings leave open of averaged shadows: by frames all over the animation, whichever of them are rendered, so that each
 /// frame is the same alone and among others. Returns the shadow rays that took.

@@ -30,13 +30,13 @@ pub struct GridField {
 /// Why known points make no regular grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// No layer of theirs is regular.
+    /// No layer of theirs lies on a grid.
     #[error(
-        "holds no mesh points of the layout `regular`, which a .vti needs; a .vtu takes those of any layout"
+        "holds no mesh points of the layouts `regular` and `body-centred`, which a .vti needs; a .vtu takes those of any layout"
     )]
     NotRegular,
     /// None has the spacing that is asked for.
-    #[error("no regular mesh points have the spacing {asked}; there are: {spacings}")]
+    #[error("no grid of mesh points has the spacing {asked}; there are: {spacings}")]
     NoSuchSpacing {
         /// What is asked for.
         asked: f32,

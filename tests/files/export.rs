@@ -167,7 +167,7 @@ fn vtk_reads_a_layer_of_mesh_points_as_a_grid() {
 /// Of several layers the one with most points is written, or the one that is asked for, whose points may be those of finer ones; what is no grid, or
 /// not there, is said.
 #[test]
-fn a_grid_is_of_one_regular_layer() {
+fn a_grid_is_of_one_layer() {
     let (known, _) = known_of(&PointLayout::Regular, &[0.4, 0.8]);
     let step = |spacing| GridField::of_known(&known, spacing).map(|field| field.grid.step);
     assert_eq!(step(None), Ok(Vec3::splat(0.4)));
@@ -179,8 +179,12 @@ fn a_grid_is_of_one_regular_layer() {
         step(Some(0.3)),
         Err(GridError::NoSuchSpacing { asked: 0.3, spacings: "0.4, 0.8".to_owned() })
     );
+    // Corners and centres of cells of 0.8 are places of a grid of 0.4.
     let (centred, _) = known_of(&PointLayout::BodyCentred, &[0.8]);
-    let error = GridField::of_known(&centred, None).expect_err("no regular layer");
+    let field = GridField::of_known(&centred, None).expect("they lie on a grid");
+    assert_eq!((field.grid.step, field.known), (Vec3::splat(0.4), centred.positions.len()));
+    let (jittered, _) = known_of(&PointLayout::Jittered { seed: 1 }, &[0.8]);
+    let error = GridField::of_known(&jittered, None).expect_err("no grid");
     assert!(error.to_string().contains(".vtu"), "{error}");
 }
 

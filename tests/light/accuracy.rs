@@ -84,7 +84,9 @@ fn views_that_settle_together_do_not_depend_on_each_other() {
     let settled = || {
         let mut session = session(&scene.scene);
         let never = StopToken::default();
-        [&far, &near].map(|camera| session.settle(camera, &settings, &never).expect("something to choose"));
+        for camera in [&far, &near] {
+            session.settle(camera, &settings, &never).expect("something to choose");
+        }
         session
     };
     let mut both = settled();

@@ -163,8 +163,8 @@ fn points_of_a_view_are_exported() {
     holds("f.ply", format!("element vertex {count}\n"));
     holds("f.vti", "<VTKFile type=\"ImageData\"".to_owned());
     assert!(errors.contains(&format!(": {count} are known\n")), "{errors}");
-    let centred = SCENE.replace("[render]", "[light_mesh]\nlayout = \"body-centred\"\n[render]");
-    fs::write(folder.path().join("centred.toml"), centred).expect("writable");
+    let jittered = SCENE.replace("[render]", "[light_mesh]\nlayout = \"jittered\"\n[render]");
+    fs::write(folder.path().join("jittered.toml"), jittered).expect("writable");
     for (scene, arguments, code, expected) in [
         ("scene.toml", &["-o", "f.obj"][..], 1, "ends in .vtu, .ply or .vti"),
         ("scene.toml", &["-o", "g.ply", "--camera", "none"], 1, "no camera is named `none`"),
@@ -172,7 +172,7 @@ fn points_of_a_view_are_exported() {
             "scene.toml",
             &["-o", "g.vti", "--spacing", "7"],
             1,
-            "scene.toml: no regular mesh points have the spacing 7; there",
+            "scene.toml: no grid of mesh points has the spacing 7; there",
         ),
         (
             "scene.toml",
@@ -181,10 +181,10 @@ fn points_of_a_view_are_exported() {
             "--spacing goes with an output that ends in .vti",
         ),
         (
-            "centred.toml",
+            "jittered.toml",
             &["-o", "g.ply", "-o", "g.vti"],
             1,
-            "centred.toml: holds no mesh points of the layout `regular`",
+            "jittered.toml: holds no mesh points of the layouts `regular` and",
         ),
     ] {
         let output = run(folder.path(), &[&["export", scene], arguments].concat());

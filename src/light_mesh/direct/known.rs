@@ -20,7 +20,7 @@ pub struct KnownPoints {
     pub visible: Vec<u32>,
     /// Number of the layer, a layout and spacing; of points in several, the first.
     pub layers: Vec<u32>,
-    /// The grids of the layers, by number; `None` for layouts that are not regular.
+    /// The grids that the layers' points lie on, by number; `None` for layouts that lie on none.
     pub grids: Vec<Option<LayerGrid>>,
 }
 

@@ -7,6 +7,7 @@ use glam::{IVec3, Vec3};
 
 use super::ids::{Blocks, within_range};
 use super::kernel::Kernel;
+use super::lattice::LayerGrid;
 use super::neighbours::{Nearest, Neighbours};
 use crate::Bounds;
 use crate::sampling::SplitMix64;
@@ -79,6 +80,11 @@ impl PeriodicPoints {
     /// cell, or every other point along the curve.
     pub fn is_in_second_half(&self, id: u64) -> bool {
         (id & self.parity).count_ones() % 2 == 1
+    }
+
+    /// The grid of half the spacing, on which body-centred points lie.
+    pub fn half_grid(&self) -> LayerGrid {
+        LayerGrid { origin: self.origin, spacing: self.spacing * 0.5 }
     }
 
     /// The point that lies exactly at a position, if there is one.

@@ -136,11 +136,13 @@ impl PointSet {
         self.layers.iter().map(|layer| (&layer.layout, layer.spacing, layer.levels))
     }
 
-    /// Grids of the layers, in the order of their numbers; `None` for layouts that are not regular.
+    /// Grids of the layers, in the order of their numbers; that of a body-centred one has half its spacing, and points at a quarter of its places. `None`
+    /// for layouts that lie on no grid.
     pub(crate) fn grids(&self) -> impl Iterator<Item = Option<LayerGrid>> {
-        self.layers.iter().map(|layer| match &layer.positions {
-            Positions::Lattice(lattice) => Some(lattice.grid()),
-            Positions::Periodic(_) | Positions::List(_) => None,
+        self.layers.iter().map(|layer| match (&layer.positions, &layer.layout) {
+            (Positions::Lattice(lattice), _) => Some(lattice.grid()),
+            (Positions::Periodic(points), PointLayout::BodyCentred) => Some(points.half_grid()),
+            _ => None,
         })
     }
 
