@@ -5,7 +5,7 @@ use super::mean;
 use super::open_points::OpenPoints;
 use crate::accel::Accel;
 use crate::image::Image;
-use crate::render::accuracy::{Accuracy, Ending};
+use crate::render::accuracy::{Accuracy, Ending, ErrorEstimate};
 use crate::render::error::RenderError;
 use crate::render::fixed::View;
 use crate::render::held_out::HeldOut;
@@ -160,16 +160,14 @@ impl<A: Accel> View<'_, A> {
         stats: &mut RenderStats,
     ) -> Result<(), RenderError> {
         let Some(open) = open else { return Ok(()) };
-        let mut doublings = 0;
         while !open.is_over() {
             let points = open.points(&settings.mesh.direct);
             let before = std::mem::replace(&mut settings.mesh.direct, points);
             let meant = settings.shading.estimator;
-            let errors = self.check_memory(settings, meshes).and_then(|()| {
-                let count = (self.pixels_for(settings, meshes)? << doublings).min(PIXELS.1);
-                self.errors_of(settings, meant, (&mut open.held_out, count), meshes, stats)
-            });
-            let errors = match errors {
+            let estimate = self
+                .check_memory(settings, meshes)
+                .and_then(|()| self.judge(settings, meant, asked, &mut open.held_out, meshes, stats));
+            let estimate = match estimate {
                 Err(RenderError::Mesh(_)) if open.fitting.is_some() => {
                     settings.mesh.direct = before;
                     open.end();
@@ -178,20 +176,39 @@ impl<A: Accel> View<'_, A> {
                 Err(error @ RenderError::Memory { .. }) => {
                     return self.take_what_fits(settings, open, meshes, error);
                 }
-                errors => errors?,
+                estimate => estimate?,
             };
             open.fitting = Some(open.step);
-            match errors.estimate(None).filter(|estimate| !estimate.is_within(asked)) {
-                // More pixels cost less than a finer mesh that isn't needed.
-                Some(estimate) if doublings < DOUBLINGS && !estimate.is_above(asked) => doublings += 1,
-                Some(estimate) => {
-                    doublings = 0;
-                    open.refine(estimate.error / asked);
-                }
+            match estimate.filter(|estimate| !estimate.is_within(asked)) {
+                Some(estimate) => open.refine(estimate.error / asked),
                 None => return self.choose_estimator(settings, asked, open, meshes, stats),
             }
         }
         Ok(())
+    }
+
+    /// The error of a picture by these settings, `meant` to be by an estimator, at held-out pixels: at more of them where they leave it open whether
+    /// it is what is `asked`, which costs less than a finer mesh that isn't needed.
+    fn judge(
+        &self,
+        settings: &Settings,
+        meant: Estimator,
+        asked: f32,
+        held_out: &mut HeldOut,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<Option<ErrorEstimate>, RenderError> {
+        let fewest = self.pixels_for(settings, meshes)?;
+        let mut estimate = None;
+        for doublings in 0..=DOUBLINGS {
+            let count = (fewest << doublings).min(PIXELS.1);
+            estimate =
+                self.errors_of(settings, meant, (&mut *held_out, count), meshes, stats)?.estimate(None);
+            if estimate.is_none_or(|estimate| estimate.is_within(asked) || estimate.is_above(asked)) {
+                break;
+            }
+        }
+        Ok(estimate)
     }
 
     /// Puts the finest points into the settings that memory allows, of those between what was tried before and what it doesn't allow.
@@ -249,13 +266,12 @@ impl<A: Accel> View<'_, A> {
         let may = settings.limits.estimator_open && meant == Estimator::PerLight;
         if may && self.world.lights.len() >= MANY_LIGHTS {
             settings.shading.estimator = Estimator::Directional;
-            let errors = self.check_memory(settings, meshes).and_then(|()| {
-                let count = self.pixels_for(settings, meshes)?;
-                self.errors_of(settings, meant, (&mut open.held_out, count), meshes, stats)
-            });
-            let is_good = match errors {
+            let estimate = self
+                .check_memory(settings, meshes)
+                .and_then(|()| self.judge(settings, meant, asked, &mut open.held_out, meshes, stats));
+            let is_good = match estimate {
                 Err(RenderError::Memory { .. }) => false,
-                errors => errors?.estimate(None).is_none_or(|estimate| estimate.is_within(asked)),
+                estimate => estimate?.is_none_or(|estimate| estimate.is_within(asked)),
             };
             if !is_good {
                 settings.shading.estimator = meant;
