@@ -38,7 +38,8 @@ pub struct ErrorEstimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
-    /// The error is within the limit: pixels or blocks all over the picture say so with 95 % confidence, and the brightest pixels don't contradict.
+    /// The error is within the limit: pixels or blocks all over the picture say so with 95 % confidence, and the brightest pixels don't contradict it with as
+    /// much.
     Error,
     /// The settings leave nothing open by which the error could be made smaller.
     Settings,
@@ -200,6 +201,9 @@ impl fmt::Display for Accuracy {
             None => f.write_str("error not measured")?,
         }
         match self.ending {
+            Ending::Error if self.found.is_some_and(|found| found.error > self.asked) => {
+                write!(f, "; the {asked} % asked for are within its interval")?
+            }
             Ending::Error => write!(f, "; within the {asked} % asked for")?,
             Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
             Ending::Settled => {

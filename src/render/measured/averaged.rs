@@ -72,8 +72,11 @@ impl<A: Accel> View<'_, A> {
             stats.rays.add(&trial.rays);
             stats.mesh_points.direct.evaluated += trial.mesh_points.direct.evaluated;
             stats.seconds.check += seconds;
-            // That the error is small enough was said with confidence before; brighter pixels would have to contradict it.
-            let missed = found.filter(|found| found.error > asked);
+            // That the error of a mesh that was chosen is small enough was said with confidence before: brighter pixels would have to contradict it with as much.
+            let is_missed = |found: &ErrorEstimate| {
+                if open.is_some() { found.is_above(asked) } else { found.error > asked }
+            };
+            let missed = found.filter(is_missed);
             let ending = match (&mut open, missed) {
                 (_, None) => ended.unwrap_or(Ending::Error),
                 (Some(open), _) if open.by_memory => Ending::Memory,
