@@ -12,7 +12,7 @@ use crate::settings::{OutputSettings, Settings};
 /// What was found for a view.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct KnownView {
-    /// Whether a file knows it: those of this session are measured anew.
+    /// Whether a file knows it: what was only rendered is measured anew.
     #[serde(skip, default = "yes")]
     pub of_file: bool,
     /// Of the camera and the settings.

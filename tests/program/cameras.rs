@@ -2,10 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
-use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::rendered::{render, shadow_rays};
 
 /// A triangle between lamps and a floor, seen from two sides by cameras that stand still and from above by one that moves. The spacing is left open, so
 /// that it is chosen by what a camera sees.
@@ -50,23 +50,9 @@ fn folder() -> TempDir {
     folder
 }
 
-fn render(folder: &Path, scene: &str, flags: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lightmesh"))
-        .args(["render", scene, "--backend", "bvh", "--float"])
-        .args(flags)
-        .current_dir(folder)
-        .output()
-        .expect("the program runs")
-}
-
 fn succeeds(folder: &Path, flags: &[&str]) {
-    let output = render(folder, "scene.toml", flags);
+    let output = render(folder, "scene.toml", &[&["--float"], flags].concat());
     assert!(output.status.success(), "{flags:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
-
-fn shadow_rays(folder: &Path, file: &str) -> u64 {
-    let stats: Value = serde_json::from_slice(&fs::read(folder.join(file)).expect("written")).expect("JSON");
-    stats["rays"]["shadow"].as_u64().expect("a count")
 }
 
 /// Files are named after their cameras, as far as files can be; each is, to the byte, what its camera alone makes; the second camera profits from what the

@@ -1,11 +1,11 @@
 //! `render --frames` renders the frames of an animation, each to a file of its own, and each as if it were rendered alone.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::rendered::{render, shadow_rays};
 
 /// A triangle that passes between a lamp and a floor, under a camera on a turntable. Without `--max-error 0` the choice of the spacing would trace rays of its own.
 const SCENE: &str = "
@@ -45,24 +45,10 @@ fn folder() -> TempDir {
     folder
 }
 
-fn render(folder: &Path, scene: &str, flags: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lightmesh"))
-        .args(["render", scene, "--backend", "bvh"])
-        .args(flags)
-        .current_dir(folder)
-        .output()
-        .expect("the program runs")
-}
-
 fn lines(output: &Output) -> String {
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{stderr}");
     stderr
-}
-
-fn shadow_rays(folder: &Path, file: &str) -> u64 {
-    let stats: Value = serde_json::from_slice(&fs::read(folder.join(file)).expect("written")).expect("JSON");
-    stats["rays"]["shadow"].as_u64().expect("a count")
 }
 
 /// Each frame has its own file and numbers, and is what a process that renders it alone makes of it; it takes fewer rays, and a line says what was kept.

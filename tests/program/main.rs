@@ -19,5 +19,6 @@ mod memory;
 mod pipeline;
 mod probe;
 mod progress;
+mod rendered;
 mod same_bytes;
 mod views;
