@@ -104,6 +104,29 @@ fn that_count(weights: &Lanes) -> u16 {
     (quarter[0] | quarter[1] | quarter[2] | quarter[3]) as u16
 }
 
+/// Where the mesh points around a cell are put.
+pub struct PacketWriter<'a> {
+    packets: &'a mut Vec<PointPacket>,
+    /// The next lane of the last packet.
+    lane: usize,
+}
+
+impl PacketWriter<'_> {
+    /// Adds a point.
+    #[inline(always)]
+    pub fn push(&mut self, id: u64, slot: u32, position: Vec3) {
+        if self.lane == LANES {
+            self.packets.push(PointPacket::EMPTY);
+            self.lane = 0;
+        }
+        if let Some(packet) = self.packets.last_mut() {
+            (0..3).for_each(|axis| packet.position[axis][self.lane] = position[axis]);
+            (packet.ids[self.lane], packet.slots[self.lane]) = (id, slot);
+        }
+        self.lane += 1;
+    }
+}
+
 /// A cell of space: the layer of mesh points that holds there, and its place in units of its side.
 pub type Cell = (u32, IVec3);
 
@@ -133,14 +156,13 @@ pub struct CellCache {
 }
 
 impl CellCache {
-    /// The packets around a cell; `surround` calls its argument for each point (id, slot, position) that may be in the
-    /// ball of some point of the cell, in a fixed order. Where much is kept already, `forget` receives all packets
+    /// The packets around a cell; `surround` writes each point that may be in the ball of some point of the cell, in a fixed order. Where much is kept already, `forget` receives all packets
     /// before they are dropped.
     #[inline(always)]
     pub fn around(
         &mut self,
         cell: Cell,
-        surround: impl FnOnce(&mut dyn FnMut(u64, u32, Vec3)),
+        surround: impl FnOnce(&mut PacketWriter),
         forget: impl FnMut(&PointPacket),
     ) -> Surroundings<'_> {
         if self.cells.get(self.current).is_none_or(|known| known.cell != cell) {
@@ -159,7 +181,7 @@ impl CellCache {
     fn turn_to(
         &mut self,
         cell: Cell,
-        surround: impl FnOnce(&mut dyn FnMut(u64, u32, Vec3)),
+        surround: impl FnOnce(&mut PacketWriter),
         forget: impl FnMut(&PointPacket),
     ) {
         if self.table.is_empty() {
@@ -187,19 +209,7 @@ impl CellCache {
             }
         }
         let first = self.packets.len();
-        let packets = &mut self.packets;
-        let mut lane = LANES;
-        surround(&mut |id, slot, position| {
-            if lane == LANES {
-                packets.push(PointPacket::EMPTY);
-                lane = 0;
-            }
-            if let Some(packet) = packets.last_mut() {
-                (0..3).for_each(|axis| packet.position[axis][lane] = position[axis]);
-                (packet.ids[lane], packet.slots[lane]) = (id, slot);
-            }
-            lane += 1;
-        });
+        surround(&mut PacketWriter { packets: &mut self.packets, lane: LANES });
         self.cells.push(KnownCell { cell, packets: first..self.packets.len(), normal: Vec3::NAN });
         self.current = self.cells.len() - 1;
         self.table[at] = self.cells.len() as u32;

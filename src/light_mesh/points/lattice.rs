@@ -5,6 +5,7 @@ use glam::{IVec3, Vec3};
 use super::ids::{Blocks, within_range};
 use super::kernel::Kernel;
 use super::neighbours::{Nearest, Neighbours, ROW};
+use super::rounded_box::{RoundedBox, of_row};
 use crate::Bounds;
 
 /// Bricks of 4×4×4 points.
@@ -106,6 +107,24 @@ impl Lattice {
         for z in first.z..=last.z {
             for y in first.y..=last.y {
                 for x in first.x..=last.x {
+                    let cell = IVec3::new(x, y, z);
+                    each(self.id(cell), self.at(cell));
+                }
+            }
+        }
+    }
+
+    /// Calls `each(id, position)` for the points in a rounded box, in the order of [`gather`](Self::gather).
+    #[inline(always)]
+    pub fn for_each_near(&self, near: &RoundedBox, mut each: impl FnMut(u64, Vec3)) {
+        let (min, max) = near.corners();
+        let place_of = |p: Vec3| ((p - self.origin) * self.inverse_spacing).floor();
+        let (first, last) = within_range(place_of(min), place_of(max));
+        for z in first.z..=last.z {
+            for y in first.y..=last.y {
+                let begin = self.at(IVec3::new(first.x, y, z));
+                let numbers = of_row(near.of_row(begin.y, begin.z), begin.x, self.inverse_spacing.x);
+                for x in first.x + numbers.start..(first.x + numbers.end).min(last.x + 1) {
                     let cell = IVec3::new(x, y, z);
                     each(self.id(cell), self.at(cell));
                 }

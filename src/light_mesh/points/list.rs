@@ -6,6 +6,7 @@ use glam::{I64Vec3, Vec3};
 
 use super::kernel::Kernel;
 use super::neighbours::{Nearest, Neighbours};
+use super::rounded_box::RoundedBox;
 use crate::Bounds;
 
 /// Mean number of points per cell that the cells' size aims at.
@@ -95,6 +96,17 @@ impl PointList {
     pub fn for_each_in_box(&self, min: Vec3, max: Vec3, each: impl FnMut(u64, Vec3)) {
         let cell_of = |p: Vec3| ((p - self.origin) * self.inverse_cell).floor().as_i64vec3();
         self.for_each_in_cells(cell_of(min), cell_of(max), each);
+    }
+
+    /// Calls `each(id, position)` for the points in a rounded box, in the order of [`gather`](Self::gather).
+    #[inline(always)]
+    pub fn for_each_near(&self, near: &RoundedBox, mut each: impl FnMut(u64, Vec3)) {
+        let (min, max) = near.corners();
+        self.for_each_in_box(min, max, |id, position| {
+            if near.holds(position) {
+                each(id, position);
+            }
+        });
     }
 
     /// The points of the kernel, in a fixed order.

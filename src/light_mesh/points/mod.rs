@@ -10,6 +10,7 @@ mod neighbourhoods;
 mod neighbours;
 mod periodic;
 mod point_set;
+mod rounded_box;
 
 pub(crate) use cells::{CellCache, PointPacket, Surroundings};
 pub(crate) use kernel::Kernel;

@@ -2,10 +2,11 @@
 
 use glam::{UVec3, Vec3};
 
-use super::cells::{CellCache, PointPacket, Surroundings};
+use super::cells::{CellCache, PacketWriter, PointPacket, Surroundings};
 use super::kernel::Kernel;
 use super::neighbours::Neighbours;
 use super::point_set::{MeshError, PointSet};
+use super::rounded_box::RoundedBox;
 use crate::Bounds;
 use crate::scene::{PixelFootprint, SurfacePoint};
 use crate::settings::{
@@ -230,8 +231,8 @@ impl Neighbourhoods {
         let (side, inverse) = zone.cells?;
         let place = (surface.position * inverse).floor();
         let cell = (number as u32, place.as_ivec3());
-        let surround = |each: &mut dyn FnMut(u64, u32, Vec3)| {
-            zone.surround(points, place, side, |id, position| each(id, slot(id), position));
+        let surround = |packets: &mut PacketWriter| {
+            zone.surround(points, place, side, |id, position| packets.push(id, slot(id), position));
         };
         let around = cells.around(cell, surround, forget);
         Some((self.kernel_in(zone, surface), around))
@@ -304,18 +305,13 @@ impl Zone {
 
     /// Calls `each(id, position)` for the points that may lie in the kernel of some point in a cell.
     #[inline(always)]
-    fn surround(&self, points: &PointSet, place: Vec3, side: f32, mut each: impl FnMut(u64, Vec3)) {
+    fn surround(&self, points: &PointSet, place: Vec3, side: f32, each: impl FnMut(u64, Vec3)) {
         let center = (place + 0.5) * side;
         // What rounding may add to R, generously.
         let slack = 1e-4 * self.radius + 16.0 * f32::EPSILON * center.abs().max_element();
-        let reach = self.radius + slack;
-        let half = Vec3::splat(0.5 * side + reach);
-        points.for_each_in_box(self.layer, center - half, center + half, |id, position| {
-            let beside = ((position - center).abs() - 0.5 * side).max(Vec3::ZERO);
-            if beside.length_squared() < reach * reach {
-                each(id, position);
-            }
-        });
+        let (half, reach) = (0.5 * side, self.radius + slack);
+        let near = RoundedBox { min: center - half, max: center + half, reach };
+        points.for_each_near(self.layer, &near, each);
     }
 }
 

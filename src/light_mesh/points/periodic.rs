@@ -3,12 +3,15 @@
 //! A tile of 8×8×8 spacings holds 512 (body-centred: 1,024) points and repeats along the axes, so that a set of any extent
 //! has arithmetic positions and lookups and takes no memory.
 
+use std::ops::Range;
+
 use glam::{IVec3, Vec3};
 
 use super::ids::{Blocks, within_range};
 use super::kernel::Kernel;
 use super::lattice::LayerGrid;
 use super::neighbours::{Nearest, Neighbours};
+use super::rounded_box::{RoundedBox, of_row};
 use crate::Bounds;
 use crate::sampling::SplitMix64;
 
@@ -34,8 +37,22 @@ pub struct PeriodicPoints {
     points: Vec<Vec3>,
     /// First point of each cell (x fastest), by the cell's own number; one more at the end of the curve.
     cells: Vec<(u32, u32)>,
-    /// Bits of an id of which an odd number says that the point is in the second half.
-    parity: u64,
+    layout: PeriodicLayout,
+}
+
+/// One of the tiles in space.
+struct Tile {
+    number: u64,
+    /// Its lowest cell.
+    corner: IVec3,
+}
+
+impl Tile {
+    /// Id of one of its points.
+    #[inline(always)]
+    fn id(&self, index: u32) -> u64 {
+        self.number * TILE_IDS + u64::from(index)
+    }
 }
 
 /// How the points of a tile are laid out.
@@ -67,19 +84,19 @@ impl PeriodicPoints {
                 (begin as u32, end as u32)
             })
             .collect();
-        let parity = match layout {
-            // A cell's corner, then its centre; points along the curve.
-            PeriodicLayout::BodyCentred | PeriodicLayout::BlueNoise => 0b1,
-            // The lowest bits of x, y and z of the cell.
-            PeriodicLayout::Jittered => 0b111,
-        };
-        Self { origin, spacing, inverse_spacing: spacing.recip(), points, cells, parity }
+        Self { origin, spacing, inverse_spacing: spacing.recip(), points, cells, layout }
     }
 
     /// Whether a point is in the second of two halves of all points that lie among each other: corners and centres of cells, or the points of every other
     /// cell, or every other point along the curve.
     pub fn is_in_second_half(&self, id: u64) -> bool {
-        (id & self.parity).count_ones() % 2 == 1
+        let parity = match self.layout {
+            // A cell's corner, then its centre; points along the curve.
+            PeriodicLayout::BodyCentred | PeriodicLayout::BlueNoise => 0b1,
+            // The lowest bits of x, y and z of the cell.
+            PeriodicLayout::Jittered => 0b111,
+        };
+        (id & parity).count_ones() % 2 == 1
     }
 
     /// The grid of half the spacing, on which body-centred points lie.
@@ -119,24 +136,31 @@ impl PeriodicPoints {
     fn for_each_in_cells(&self, (first, last): (IVec3, IVec3), mut each: impl FnMut(u64, Vec3)) {
         for z in first.z..=last.z {
             for y in first.y..=last.y {
-                let mut x = first.x;
-                while x <= last.x {
-                    // The cells of a row that lie in one tile: what the tile is, is found once for all of them.
-                    let number = TILES.of(IVec3::new(x, y, z));
-                    let corner = TILES.first_cell(number);
-                    let row = ((z - corner.z) * EDGE + y - corner.y) * EDGE;
-                    let end = last.x.min(corner.x + EDGE - 1);
-                    for &(begin, end) in
-                        &self.cells[(row + x - corner.x) as usize..=(row + end - corner.x) as usize]
-                    {
-                        for index in begin..end {
-                            let position = self.at(corner, self.points[index as usize]);
-                            each(number * TILE_IDS + u64::from(index), position);
-                        }
+                self.for_each_of_row(first.x..last.x + 1, y, z, |_, tile, points| {
+                    for index in points {
+                        each(tile.id(index), self.at(tile.corner, self.points[index as usize]));
                     }
-                    x = end + 1;
-                }
+                });
             }
+        }
+    }
+
+    /// Calls `each(x, tile, indices of points in it)` for the cells of a row.
+    #[inline(always)]
+    fn for_each_of_row(&self, xs: Range<i32>, y: i32, z: i32, mut each: impl FnMut(i32, &Tile, Range<u32>)) {
+        let mut x = xs.start;
+        while x < xs.end {
+            // The cells of a row that lie in one tile: what the tile is, is found once for all of them.
+            let number = TILES.of(IVec3::new(x, y, z));
+            let tile = Tile { number, corner: TILES.first_cell(number) };
+            let corner = tile.corner;
+            let row = ((z - corner.z) * EDGE + y - corner.y) * EDGE;
+            let end = xs.end.min(corner.x + EDGE);
+            let cells = &self.cells[(row + x - corner.x) as usize..(row + end - corner.x) as usize];
+            for (x, &(begin, end)) in (x..end).zip(cells) {
+                each(x, &tile, begin..end);
+            }
+            x = end;
         }
     }
 
@@ -151,6 +175,40 @@ impl PeriodicPoints {
     #[inline(always)]
     pub fn for_each_in_box(&self, min: Vec3, max: Vec3, each: impl FnMut(u64, Vec3)) {
         self.for_each_in_cells(self.cells_in(min, max), each);
+    }
+
+    /// Calls `each(id, position)` for the points in a rounded box, in the order of [`gather`](Self::gather).
+    #[inline(always)]
+    pub fn for_each_near(&self, near: &RoundedBox, mut each: impl FnMut(u64, Vec3)) {
+        let (min, max) = near.corners();
+        if self.layout != PeriodicLayout::BodyCentred {
+            return self.for_each_in_box(min, max, |id, position| {
+                if near.holds(position) {
+                    each(id, position);
+                }
+            });
+        }
+        // Both points of a cell begin a row of their own, and which points of a row are near is known without a look at each.
+        let (first, last) = self.cells_in(min, max);
+        for z in first.z..=last.z {
+            for y in first.y..=last.y {
+                let corner = self.at(IVec3::new(first.x, y, z), Vec3::ZERO);
+                let center = corner + 0.5 * self.spacing;
+                let corners = of_row(near.of_row(corner.y, corner.z), corner.x, self.inverse_spacing.x);
+                let centers = of_row(near.of_row(center.y, center.z), center.x, self.inverse_spacing.x);
+                let (begin, end) = (corners.start.min(centers.start), corners.end.max(centers.end));
+                let cells = first.x + begin..(first.x + end).min(last.x + 1);
+                self.for_each_of_row(cells, y, z, |x, tile, points| {
+                    let mut point = |index: u32, numbers: &Range<i32>| {
+                        if numbers.contains(&(x - first.x)) {
+                            each(tile.id(index), self.at(tile.corner, self.points[index as usize]));
+                        }
+                    };
+                    point(points.start, &corners);
+                    point(points.start + 1, &centers);
+                });
+            }
+        }
     }
 
     /// The points of the kernel, in a fixed order.

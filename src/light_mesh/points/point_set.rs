@@ -8,6 +8,7 @@ use super::lattice::{Lattice, LayerGrid};
 use super::list::PointList;
 use super::neighbours::Neighbours;
 use super::periodic::{PeriodicLayout, PeriodicPoints};
+use super::rounded_box::RoundedBox;
 use crate::Bounds;
 use crate::settings::PointLayout;
 
@@ -249,6 +250,15 @@ impl PointSet {
         let layer = &self.layers[layer];
         with_positions!(layer, positions => {
             positions.for_each_in_box(min, max, |id, position| each(layer.first_id + id, position));
+        });
+    }
+
+    /// Calls `each(id, position)` for all points of a layer in a rounded box, in the order of [`gather`](Self::gather).
+    #[inline(always)]
+    pub(super) fn for_each_near(&self, layer: usize, near: &RoundedBox, mut each: impl FnMut(u64, Vec3)) {
+        let layer = &self.layers[layer];
+        with_positions!(layer, positions => {
+            positions.for_each_near(near, |id, position| each(layer.first_id + id, position));
         });
     }
 }
