@@ -20,6 +20,16 @@ pub struct Lookup<'a> {
     pub(crate) leaks: Leaks,
 }
 
+/// What [`Lookup::look`] found.
+pub(super) struct SeenPoints {
+    /// Which way the surface points face: what they see is in [`PointPacket::sight`] there.
+    pub octant: usize,
+    /// Whether any point of D_y is seen.
+    pub any: bool,
+    /// Rays traced.
+    pub rays: u64,
+}
+
 /// Tells whether mesh points differ so much that it matters which of them a surface point sees.
 ///
 /// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
@@ -106,11 +116,31 @@ impl Lookup<'_> {
     ) -> Option<u64> {
         let LookupScratch { points, cells, .. } = scratch;
         let (kernel, around) = self.around(surface, cells.as_mut()?)?;
+        let seen = self.look(accel, surface, &kernel, around.packets);
+        if seen.any {
+            points.clear();
+            for packet in around.packets {
+                let (weights, lanes) = packet.weigh(&kernel);
+                points.push_packet(packet, &weights, lanes & packet.sight[seen.octant].clear);
+            }
+        }
+        Some(seen.rays)
+    }
+
+    /// Finds out which points of D_y are seen by the surface points of a cell that face the same way, as far as that is unknown.
+    #[inline(always)]
+    pub(super) fn look<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        kernel: &Kernel,
+        packets: &mut [PointPacket],
+    ) -> SeenPoints {
         let octant = usize::from(surface.geometric_normal.is_negative_bitmask() as u8 & 7);
         let origin = surface.ray_origin();
-        let (mut rays, mut any_clear) = (0, false);
-        for packet in &mut *around.packets {
-            let (_, lanes) = packet.weigh(&kernel);
+        let mut seen = SeenPoints { octant, any: false, rays: 0 };
+        for packet in packets {
+            let (_, lanes) = packet.weigh(kernel);
             let unknown = lanes & !packet.sight[octant].known;
             if unknown != 0 {
                 let mut query = RayPacket::<LANES>::empty();
@@ -121,18 +151,11 @@ impl Lookup<'_> {
                 let blocked = accel.occluded_packet(active, &mut query, Coherence::Incoherent);
                 packet.sight[octant].known |= unknown;
                 packet.sight[octant].clear |= (active & !blocked) as u16;
-                rays += u64::from(unknown.count_ones());
+                seen.rays += u64::from(unknown.count_ones());
             }
-            any_clear |= lanes & packet.sight[octant].clear != 0;
+            seen.any |= lanes & packet.sight[octant].clear != 0;
         }
-        if any_clear {
-            points.clear();
-            for packet in around.packets {
-                let (weights, lanes) = packet.weigh(&kernel);
-                points.push_packet(packet, &weights, lanes & packet.sight[octant].clear);
-            }
-        }
-        Some(rays)
+        seen
     }
 
     /// D_y with slots for one of many surface points that lie close together: `cells` keeps what is the same for all. It must

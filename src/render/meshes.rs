@@ -87,6 +87,8 @@ pub struct MeshInterpolation {
     pub(super) hybrid: bool,
     /// What may be wrong with a pixel that is traced in part, as a share of its light.
     pub(super) tolerance: f32,
+    /// What interpolation of averaged light between pixels may change, as a share of it.
+    pub(super) pixel_tolerance: f32,
 }
 
 impl MeshInterpolation {
@@ -186,6 +188,7 @@ impl LightMeshes {
             direct_scale: shading.direct_scale(),
             hybrid,
             tolerance: shading.tolerance,
+            pixel_tolerance: shading.pixel_tolerance,
         })
     }
 
@@ -206,6 +209,7 @@ impl LightMeshes {
             direct_scale: shading.direct_scale(),
             hybrid: false,
             tolerance: shading.tolerance,
+            pixel_tolerance: shading.pixel_tolerance,
         })
     }
 

@@ -42,7 +42,7 @@ impl Settled {
     /// The settings of that picture, given those that left it open: nothing is measured any more.
     pub(super) fn settings(&self, asked: &Settings) -> Settings {
         let mut settings = asked.clone();
-        settings.limits.max_error = None;
+        settings.shading.tolerate_pixels(settings.limits.max_error.take());
         (settings.limits.steps, settings.limits.time) = (Steps::Count(1), None);
         settings.shading.integrator = self.integrator;
         settings.shading.tolerance = self.tolerance;

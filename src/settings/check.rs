@@ -61,6 +61,8 @@ impl Settings {
         check("view.weight_threshold", "be a number from 0 up", threshold, threshold >= 0.0)?;
         let tolerance = shading.tolerance;
         check("shading.tolerance", "be a number from 0 up", tolerance, tolerance >= 0.0)?;
+        let tolerance = shading.pixel_tolerance;
+        check("shading.pixel_tolerance", "be a number from 0 up", tolerance, tolerance >= 0.0)?;
         let radius = |name, radius: Radius| {
             let (Radius::Units(length) | Radius::Spacings(length)) = radius;
             check(name, "be finite and above 0", length, is_length(length))

@@ -18,6 +18,9 @@ pub struct ShadingSettings {
     pub resolve: Resolve,
     /// With [`Resolve::Trace`]: what all decisions not to trace a ray may cost, as a share of a pixel's light, from 0 up.
     pub tolerance: f32,
+    /// With [`Resolve::Average`]: what light that is interpolated between pixels may be wrong by where it is looked at, as a share of it, from 0 up (method §9). 0 if the
+    /// light of every pixel is looked up. A render that measures its error chooses this by itself.
+    pub pixel_tolerance: f32,
     /// D_y in the direct mesh.
     pub kernel: KernelSettings,
     /// How indirect light follows from the indirect mesh, if there is one.
@@ -33,6 +36,7 @@ impl Default for ShadingSettings {
             estimator: Estimator::PerLight,
             resolve: Resolve::Average,
             tolerance: 0.01,
+            pixel_tolerance: 0.0,
             kernel: KernelSettings::default(),
             indirect: IndirectShading::default(),
         }
@@ -43,6 +47,13 @@ impl ShadingSettings {
     /// What I(y) is multiplied by before k_d: 1, or 1/π for Lambertian reflectors (method §12).
     pub fn direct_scale(&self) -> f32 {
         if self.lambertian { std::f32::consts::FRAC_1_PI } else { 1.0 }
+    }
+
+    /// Puts the pixel tolerance into them that goes with a picture of so large an error: what it adds is hardly to be seen beside that.
+    pub(crate) fn tolerate_pixels(&mut self, max_error: Option<f32>) {
+        /// Of the error that is asked for.
+        const SHARE: f32 = 1.0 / 16.0;
+        self.pixel_tolerance = SHARE * max_error.unwrap_or(0.0);
     }
 
     /// Whether a light mesh traces the edges of shadows: hybrid shadows (method §4).

@@ -58,6 +58,13 @@ fn ways() -> Vec<(&'static str, Settings)> {
         ("conventional", base(Integrator::Conventional)),
         ("reference", base(Integrator::Reference)),
         ("averaged", mesh(|settings| settings.shading.resolve = Resolve::Average)),
+        (
+            "between pixels",
+            mesh(|settings| {
+                settings.shading.resolve = Resolve::Average;
+                settings.shading.pixel_tolerance = 0.01;
+            }),
+        ),
         ("traced", mesh(|settings| settings.shading.resolve = Resolve::Trace)),
         ("directional", mesh(|settings| settings.shading.estimator = Estimator::Directional)),
         ("allowed leaks", mesh(|settings| settings.shading.kernel.leaks = Leaks::Allow)),

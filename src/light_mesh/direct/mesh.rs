@@ -14,7 +14,7 @@ use crate::light_mesh::lookup::{Lookup, LookupScratch};
 use crate::light_mesh::points::{AutoSpacing, MeshError, Neighbourhoods, PointPacket, PointSet};
 use crate::light_mesh::slot::UNKNOWN;
 use crate::light_mesh::store::{NeededPoints, PointMask, PointStore};
-use crate::lights::{PackedGroups, PackedLights};
+use crate::lights::{PackedGroups, PackedLights, expand_bits};
 use crate::scene::SurfacePoint;
 use crate::settings::{Estimator, KernelSettings, Leaks, PointSettings};
 use crate::simd::{LANES, horizontal_extremes, horizontal_sums};
@@ -256,7 +256,7 @@ impl DirectView<'_> {
     }
 
     /// Finds the points again that the illumination of a surface point, the last that was found, follows from. That takes no ray: they are there still,
-    /// or no leak rule had a question.
+    /// or what leak rules ask is known.
     #[inline(always)]
     pub(crate) fn find_again<A: Accel>(
         &self,
@@ -311,8 +311,9 @@ impl DirectView<'_> {
         scratch: &mut LookupScratch,
     ) -> Vec3 {
         if self.estimator.estimator == Estimator::Directional
-            && let Some(light) = self.directional_in_row(surface, scratch)
+            && let Some((light, rays)) = self.directional_in_row(accel, surface, scratch)
         {
+            scratch.rays += rays;
             // Those of another surface point.
             scratch.points.clear();
             return light;
@@ -320,9 +321,14 @@ impl DirectView<'_> {
         self.illumination(accel, surface, scratch)
     }
 
-    /// The estimate `directional`; `None` where D_y is empty, or has to be looked at more closely.
+    /// The estimate `directional`, and how many rays that took; `None` where D_y is empty.
     #[inline(always)]
-    fn directional_in_row(&self, surface: &SurfacePoint, scratch: &mut LookupScratch) -> Option<Vec3> {
+    fn directional_in_row<A: Accel>(
+        &self,
+        accel: &A,
+        surface: &SurfacePoint,
+        scratch: &mut LookupScratch,
+    ) -> Option<(Vec3, u64)> {
         let (kernel, around) = self.lookup.around_in(surface, scratch)?;
         if *around.normal != surface.shading_normal {
             *around.normal = surface.shading_normal;
@@ -330,28 +336,36 @@ impl DirectView<'_> {
         }
         let mut sums = [[0.0f32; LANES]; 4];
         let (mut least, mut most) = ([f32::INFINITY; LANES], [0.0f32; LANES]);
-        for packet in around.packets {
+        for packet in &*around.packets {
             let (weights, _) = packet.weigh(&kernel);
-            let [r, g, b] = &packet.lit;
+            packet.add_lit(&weights, &mut sums);
             for lane in 0..LANES {
-                // Points that don't count are marked by an amount below 0.
                 let amount = packet.amount[lane];
                 let counts = amount >= 0.0 && weights[lane] > 0.0;
-                let weight = if counts { weights[lane] } else { 0.0 };
-                sums[0][lane] += weight * r[lane];
-                sums[1][lane] += weight * g[lane];
-                sums[2][lane] += weight * b[lane];
-                sums[3][lane] += weight;
                 let (low, high) = if counts { (amount, amount) } else { (f32::INFINITY, 0.0) };
                 least[lane] = if low < least[lane] { low } else { least[lane] };
                 most[lane] = if high > most[lane] { high } else { most[lane] };
             }
         }
-        let [r, g, b, weights] = &sums;
-        let sums = horizontal_sums([r, g, b, weights]);
         let differ = self.lookup.leaks == Leaks::Visibility
             && amounts_differ(horizontal_extremes(&least, &most).into_iter());
-        (sums.w > 0.0 && !differ).then(|| sums.truncate().max(Vec3::ZERO) / sums.w)
+        let mut rays = 0;
+        if differ {
+            let seen = self.lookup.look(accel, surface, &kernel, around.packets);
+            rays = seen.rays;
+            if seen.any {
+                sums = [[0.0; LANES]; 4];
+                for packet in &*around.packets {
+                    let (mut weights, _) = packet.weigh(&kernel);
+                    let clear = expand_bits(packet.sight[seen.octant].clear);
+                    weights.iter_mut().zip(clear).for_each(|(weight, clear)| *weight *= clear);
+                    packet.add_lit(&weights, &mut sums);
+                }
+            }
+        }
+        let [r, g, b, weights] = &sums;
+        let sums = horizontal_sums([r, g, b, weights]);
+        (sums.w > 0.0).then(|| (sums.truncate().max(Vec3::ZERO) / sums.w, rays))
     }
 
     /// Whether the point in a slot counts for no surface point.

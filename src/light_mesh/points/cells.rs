@@ -81,6 +81,20 @@ impl PointPacket {
         }
         (weights, that_count(&weights))
     }
+
+    /// Adds the irradiance of those of its points that count, by channel, and last their weights, to sums by lane.
+    #[inline(always)]
+    pub fn add_lit(&self, weights: &Lanes, sums: &mut [Lanes; 4]) {
+        let [r, g, b] = &self.lit;
+        for lane in 0..LANES {
+            // Points that don't count are marked by an amount below 0.
+            let weight = if self.amount[lane] >= 0.0 && weights[lane] > 0.0 { weights[lane] } else { 0.0 };
+            sums[0][lane] += weight * r[lane];
+            sums[1][lane] += weight * g[lane];
+            sums[2][lane] += weight * b[lane];
+            sums[3][lane] += weight;
+        }
+    }
 }
 
 /// The lanes whose weight, from 0 to 1, is at least 2⁻⁶³: what is less doesn't count beside any other.

@@ -172,6 +172,17 @@ impl Neighbourhoods {
         self.zones.first().map_or(0.0, |zone| zone.radius)
     }
 
+    /// R at a position.
+    #[inline(always)]
+    pub(crate) fn radius_at(&self, y: Vec3) -> f32 {
+        self.zones[self.zone_number_at(y)].radius
+    }
+
+    /// Whether the weights of points change smoothly with the position.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.neighbourhood == Neighbourhood::SmoothSphere
+    }
+
     /// About how many points D_y has there.
     pub(crate) fn points_around(&self) -> f32 {
         self.zones.first().map_or(0.0, |zone| {

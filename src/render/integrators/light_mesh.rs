@@ -3,16 +3,17 @@
 use glam::Vec3;
 use pulp::NullaryFnOnce;
 
+use super::averaged::Averages;
 use super::hybrid::shade_hybrid;
 use crate::accel::Accel;
-use crate::light_mesh::direct::{DirectMesh, DirectView};
+use crate::light_mesh::direct::DirectMesh;
 use crate::light_mesh::indirect::{IndirectMesh, IndirectView};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::render::frame::BlockIntegrator;
 use crate::render::layers::LightParts;
 use crate::render::meshes::MeshInterpolation;
 use crate::render::need::needed_points;
-use crate::render::paths::{PathVertex, TilePaths};
+use crate::render::paths::TilePaths;
 use crate::render::stats::{RenderStats, ShadeCounters, timed};
 use crate::render::tiles::Tile;
 use crate::simd::vectorize;
@@ -55,9 +56,14 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, '_, A> {
             let parts = parts.as_deref_mut();
             counters = shade_hybrid(accel, direct, interpolation, tile, paths, &mut scratch, light, parts);
         } else {
-            match parts.as_deref_mut() {
-                Some(parts) => average::<A, true>(accel, &direct, vertices, &mut scratch, light, Some(parts)),
-                None => average::<A, false>(accel, &direct, vertices, &mut scratch, light, None),
+            let tolerance = interpolation.pixel_tolerance;
+            let parts = parts.as_deref_mut();
+            let has_parts = parts.is_some();
+            let averages = Averages { accel, direct, tolerance, tile, vertices, parts };
+            if has_parts {
+                averages.fill::<true>(&mut scratch, light);
+            } else {
+                averages.fill::<false>(&mut scratch, light);
             }
         }
         counters.shadow_rays += scratch.rays;
@@ -77,43 +83,6 @@ impl<A: Accel> NullaryFnOnce for Shade<'_, '_, A> {
             add_indirect(accel, indirect.view(view), paths, light, &mut counters);
         }
         counters
-    }
-}
-
-/// Averages mesh points: fills `light` with the I of each vertex, and with it what is asked for of its parts, `WITH_PARTS` being whether anything may be. That is told
-/// apart here, since whoever asks for no parts shades measurably slower in a loop that could make some.
-#[inline(always)]
-fn average<A: Accel, const WITH_PARTS: bool>(
-    accel: &A,
-    direct: &DirectView,
-    vertices: &[PathVertex],
-    scratch: &mut LookupScratch,
-    light: &mut [Vec3],
-    parts: Option<&mut LightParts>,
-) {
-    let (mut groups, mut error) = parts.map_or((None, None), |parts| parts.of_direct());
-    let mut before = Vec3::NAN;
-    for (number, (vertex, light)) in vertices.iter().zip(light).enumerate() {
-        let surface = &vertex.surface;
-        let normal = surface.shading_normal;
-        let after = vertices.get(number + 1).map_or(Vec3::NAN, |next| next.surface.shading_normal);
-        *light = if normal == before || normal == after {
-            direct.illumination_in_row(accel, surface, scratch)
-        } else {
-            direct.illumination(accel, surface, scratch)
-        };
-        before = normal;
-        if !WITH_PARTS || (groups.is_none() && error.is_none()) {
-            continue;
-        }
-        direct.find_again(accel, surface, scratch);
-        if let Some(groups) = &mut groups {
-            let (groups, sums) = groups.of_vertex(number);
-            direct.add_by_group(surface, scratch, groups, sums);
-        }
-        if let Some(error) = error.as_mut().and_then(|error| error.get_mut(number)) {
-            *error = direct.half_difference(surface, scratch);
-        }
     }
 }
 

@@ -95,7 +95,7 @@ impl<'a> GroupLight<'a> {
     }
 
     /// Number of groups.
-    pub(super) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.groups.names().len()
     }
 

@@ -36,6 +36,7 @@ impl<A: Accel> View<'_, A> {
         meshes: &mut LightMeshes,
     ) -> Result<(Image, RenderStats), RenderError> {
         let meant = settings.shading.estimator;
+        settings.shading.tolerate_pixels(Some(asked));
         let mut open = match self.settled {
             Some(settled) => {
                 settled.choose_mesh(&mut settings);
