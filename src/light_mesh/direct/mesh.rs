@@ -332,7 +332,10 @@ impl DirectView<'_> {
         let (kernel, around) = self.lookup.around_in(surface, scratch)?;
         if *around.normal != surface.shading_normal {
             *around.normal = surface.shading_normal;
-            around.packets.iter_mut().for_each(|packet| self.light_packet(packet, surface.shading_normal));
+            // No closure: it would be compiled for the oldest processor.
+            for packet in &mut *around.packets {
+                self.light_packet(packet, surface.shading_normal);
+            }
         }
         let mut sums = [[0.0f32; LANES]; 4];
         let (mut least, mut most) = ([f32::INFINITY; LANES], [0.0f32; LANES]);

@@ -28,7 +28,9 @@ pub(super) fn comes_first(tile: &Tile, vertices: &[PathVertex], size: impl Fn(Ve
     if last.pixel != first.pixel + (edge - 1) * (tile.width + 1) || x % edge != 0 || y % edge != 0 {
         return false;
     }
-    let [a, b, c, d] = CORNERS.map(|corner| square[corner].surface.position);
+    let [a, b, c, d] = CORNERS;
+    let position = |corner: usize| square[corner].surface.position;
+    let (a, b, c, d) = (position(a), position(b), position(c), position(d));
     let size = size(a);
     let longest = a.distance_squared(d).max(b.distance_squared(c));
     let (normal, shading) = (first.surface.geometric_normal, first.surface.shading_normal);
