@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::smooth_square;
+use super::smooth_square::{self, LookUp};
 use crate::accel::Accel;
 use crate::light_mesh::direct::DirectView;
 use crate::light_mesh::lookup::LookupScratch;
@@ -40,9 +40,9 @@ impl<A: Accel> Averages<'_, '_, A> {
             let normal = vertex.surface.shading_normal;
             if between_pixels && smooth_square::comes_first(self.tile, &vertices[number..], size) {
                 let light = &mut light[number..][..smooth_square::PIXELS];
-                let interpolated = smooth_square::fill(light, self.tolerance, |place| {
-                    self.look_up::<WITH_PARTS>(number + place, true, scratch)
-                });
+                let tolerance = self.tolerance;
+                let square = Square::<A, WITH_PARTS> { averages: &mut self, first: number, scratch };
+                let interpolated = smooth_square::fill(light, tolerance, square);
                 if WITH_PARTS && interpolated {
                     self.interpolate_parts(number);
                 }
@@ -104,5 +104,20 @@ impl<A: Accel> Averages<'_, '_, A> {
                 error[first + place] = smooth_square::between(|corner| error[first + corner], place);
             }
         }
+    }
+}
+
+/// A smooth square of vertices.
+struct Square<'s, 'a, 'p, A, const WITH_PARTS: bool> {
+    averages: &'s mut Averages<'a, 'p, A>,
+    /// Number of its first vertex.
+    first: usize,
+    scratch: &'s mut LookupScratch,
+}
+
+impl<A: Accel, const WITH_PARTS: bool> LookUp for Square<'_, '_, '_, A, WITH_PARTS> {
+    #[inline(always)]
+    fn light(&mut self, place: usize) -> Vec3 {
+        self.averages.look_up::<WITH_PARTS>(self.first + place, true, self.scratch)
     }
 }

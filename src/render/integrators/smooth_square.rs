@@ -9,9 +9,13 @@ use crate::render::tiles::Tile;
 const EDGE: usize = 4;
 pub(super) const PIXELS: usize = EDGE * EDGE;
 
-/// Pixels whose light is looked up: the corners, and one between them that tells how well they stand for all.
+/// Corners of a square, and one of the pixels between them, which tells how well they stand for all.
 const CORNERS: [usize; 4] = [0, EDGE - 1, PIXELS - EDGE, PIXELS - 1];
 const WITNESS: usize = EDGE + 1;
+
+/// The order in which pixels are looked up, and how many of them always are: the corners and the witness.
+const ORDER: [usize; PIXELS] = [0, 3, 12, 15, 5, 1, 2, 4, 6, 7, 8, 9, 10, 11, 13, 14];
+const ASKED: usize = 5;
 
 /// Least cosine between the normals of a square, and greatest distance from its plane over its size.
 const FLAT_COSINE: f32 = 0.9995;
@@ -45,26 +49,39 @@ pub(super) fn comes_first(tile: &Tile, vertices: &[PathVertex], size: impl Fn(Ve
         })
 }
 
-/// Fills in the light of a smooth square's vertices. `look_up` is asked, by place in the square, for that of five; only if the one between the corners is by more than a share of
-/// `tolerance` beside what they say of it, for that of all others. Returns whether it was not, so that they are interpolated.
+/// Finds the light of one vertex of a square, by its place in the square.
+///
+/// A trait, since closures are compiled for the oldest processor wherever they are not inlined.
+pub(super) trait LookUp {
+    /// The light.
+    fn light(&mut self, place: usize) -> Vec3;
+}
+
+/// Fills in the light of a smooth square's vertices. That of five is looked up; only if the one between the corners is by more than a share of `tolerance` beside what they say of
+/// it, that of all others too. Returns whether it was not, so that they are interpolated.
 #[inline(always)]
-pub(super) fn fill(light: &mut [Vec3], tolerance: f32, mut look_up: impl FnMut(usize) -> Vec3) -> bool {
-    for place in CORNERS {
-        light[place] = look_up(place);
+pub(super) fn fill(light: &mut [Vec3], tolerance: f32, mut look_up: impl LookUp) -> bool {
+    let mut place = 0;
+    while let Some(&asked) = ORDER.get(place) {
+        if place == ASKED {
+            let said = between(|corner| light[corner], WITNESS);
+            if (said - light[WITNESS]).abs().cmple(tolerance * light[WITNESS]).all() {
+                for place in interpolated_places() {
+                    light[place] = between(|corner| light[corner], place);
+                }
+                return true;
+            }
+        }
+        light[asked] = look_up.light(asked);
+        place += 1;
     }
-    light[WITNESS] = look_up(WITNESS);
-    let said = between(|corner| light[corner], WITNESS);
-    let is_close = (said - light[WITNESS]).abs().cmple(tolerance * light[WITNESS]).all();
-    for place in interpolated_places() {
-        light[place] = if is_close { between(|corner| light[corner], place) } else { look_up(place) };
-    }
-    is_close
+    false
 }
 
 /// Places in a square between those that are always looked up.
 #[inline(always)]
 pub(super) fn interpolated_places() -> impl Iterator<Item = usize> {
-    (0..PIXELS).filter(|place| *place != WITNESS && !CORNERS.contains(place))
+    ORDER.into_iter().skip(ASKED)
 }
 
 /// What the corners say of a place in their square: they give a value each, and it is bilinear between them.
@@ -115,6 +132,28 @@ mod tests {
         }
     }
 
+    /// Light by place that counts how often it is asked.
+    struct Counted<'a, F> {
+        light: F,
+        asked: &'a mut usize,
+    }
+
+    impl<F: Fn(usize) -> Vec3> LookUp for Counted<'_, F> {
+        fn light(&mut self, place: usize) -> Vec3 {
+            *self.asked += 1;
+            (self.light)(place)
+        }
+    }
+
+    /// Every pixel is in the order once, those first that are always asked.
+    #[test]
+    fn all_pixels_are_in_order() {
+        let mut sorted = ORDER;
+        sorted.sort_unstable();
+        assert_eq!(sorted, std::array::from_fn(|place| place));
+        assert_eq!(ORDER[..ASKED], [CORNERS.as_slice(), &[WITNESS]].concat());
+    }
+
     /// Light that is bilinear is looked up at five of sixteen pixels and right at all. Where it is not, as at a dark spot, all are looked up.
     #[test]
     fn what_corners_do_not_say_is_looked_up() {
@@ -122,15 +161,13 @@ mod tests {
         let spot = |at: Vec3| if at.distance(Vec3::new(5.0, 0.0, 1.0)) < 1.2 { 0.98 } else { 1.0 };
         for (tolerance, dark, expected) in [(0.01, false, 5), (0.01, true, 16), (0.05, true, 5)] {
             let mut asked = 0;
-            let light = |place: usize| {
+            let light = &|place: usize| {
                 let at = vertices[place].surface.position;
                 Vec3::splat((2.0 + at.x) * (1.0 + at.z) * if dark { spot(at) } else { 1.0 })
             };
             let mut found = [Vec3::ZERO; 16];
-            let interpolated = fill(&mut found, tolerance, |place| {
-                asked += 1;
-                light(place)
-            });
+            let counted = Counted { light, asked: &mut asked };
+            let interpolated = fill(&mut found, tolerance, counted);
             assert_eq!((asked, interpolated), (expected, expected == 5));
             for (place, found) in found.into_iter().enumerate() {
                 assert!(found.abs_diff_eq(light(place), 1.1 * tolerance * light(place).x), "{found}");
