@@ -4,7 +4,6 @@ use glam::Vec3;
 
 use super::points::Neighbours;
 use crate::accel::{Accel, Coherence, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
-use crate::lights::VisibilityBits;
 use crate::scene::{Ray, Scene, SurfacePoint};
 use crate::settings::Leaks;
 use crate::simd::LANES;
@@ -60,22 +59,13 @@ pub fn amounts_differ(amounts: impl Iterator<Item = f32>) -> bool {
 }
 
 /// Whether mesh points see so different lights that a wall may stand between them: of the lights that any of them sees,
-/// less than one in `SHARED` is seen by all. A few leaves in the way don't do that where there are many lights.
+/// less than one in `SHARED` is seen by all. A few leaves in the way don't do that where there are many lights. The lights are given in parts, by how many all see and how
+/// many any.
 #[inline(always)]
-pub fn lights_differ<'a>(mut points: impl Iterator<Item = &'a [VisibilityBits]> + Clone) -> bool {
+pub fn lights_differ(parts: impl Iterator<Item = (u32, u32)>) -> bool {
     /// See above.
     const SHARED: u32 = 4;
-    let Some(first) = points.next() else { return false };
-    let (mut by_all, mut by_any) = (0, 0);
-    for (chunk, &bits) in first.iter().enumerate() {
-        let (mut all, mut any) = (bits, bits);
-        for other in points.clone() {
-            all &= other[chunk];
-            any |= other[chunk];
-        }
-        by_all += all.count_ones();
-        by_any += any.count_ones();
-    }
+    let (by_all, by_any) = parts.fold((0, 0), |(by_all, by_any), (all, any)| (by_all + all, by_any + any));
     by_all * SHARED < by_any
 }
 

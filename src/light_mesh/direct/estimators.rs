@@ -14,6 +14,16 @@ use crate::scene::SurfacePoint;
 use crate::settings::Estimator;
 use crate::simd::{LANES, Lanes};
 
+/// Chunks of lights whose bits make a register: 128 lights at a time are compared among points.
+const BLOCK: usize = 8;
+
+/// What points agree about, of [`BLOCK`] chunks from the `first` on.
+struct Agreement {
+    first: usize,
+    all: [VisibilityBits; BLOCK],
+    any: [VisibilityBits; BLOCK],
+}
+
 /// An estimator with what it reads: a field, whose values its [`Basis`] needs must be derived, and the lights that it is of.
 #[derive(Clone, Copy)]
 pub struct FieldEstimator<'a> {
@@ -37,6 +47,27 @@ impl<'a> FieldEstimator<'a> {
     #[inline(always)]
     pub fn bits(&self, slot: u32, chunks: usize) -> &'a [VisibilityBits] {
         &self.bits[slot as usize * chunks..][..chunks]
+    }
+
+    /// Which lights of [`BLOCK`] chunks from the `first` on all of the points in some slots see, and which any does.
+    #[inline(always)]
+    fn agreement(&self, slots: &[u32], first: usize) -> Agreement {
+        let chunks = self.lights.chunks().len();
+        let mut agreement = Agreement { first, all: [VisibilityBits::MAX; BLOCK], any: [0; BLOCK] };
+        for &slot in slots {
+            let start = slot as usize * chunks + first;
+            // What follows a short row are bits of other points, which nobody asks for.
+            let mut row = [0; BLOCK];
+            match self.bits.get(start..start + BLOCK) {
+                Some(bits) => row.copy_from_slice(bits),
+                None => row.iter_mut().zip(&self.bits[start..]).for_each(|(to, bits)| *to = *bits),
+            }
+            for chunk in 0..BLOCK {
+                agreement.all[chunk] &= row[chunk];
+                agreement.any[chunk] |= row[chunk];
+            }
+        }
+        agreement
     }
 
     /// I(y), the direct illumination of a surface point without its k_d, from known points with weights.
@@ -78,14 +109,14 @@ impl<'a> FieldEstimator<'a> {
         sums: &mut [Vec3],
     ) {
         let scale = 1.0 / points.total_weight();
-        let visibility = MeanVisibility { estimator: self, points, scale };
+        let visibility = MeanVisibility::new(self, points, scale);
         groups.add_irradiance(self.lights, surface, visibility, sums);
     }
 
     /// Σ_i Ṽ_i φ2 E_i/φ1 with Ṽ_i the mean visibility of light i over D_y.
     #[inline(always)]
     fn per_light(&self, surface: &SurfacePoint, points: &Neighbours, scale: f32) -> Vec3 {
-        self.lights.irradiance(surface, MeanVisibility { estimator: self, points, scale })
+        self.lights.irradiance(surface, MeanVisibility::new(self, points, scale))
     }
 
     /// Ĩ of eq. (3), and the same mean of the unoccluded field.
@@ -108,7 +139,13 @@ impl Differ for FieldEstimator<'_> {
         match Basis::of(self.estimator) {
             Basis::Bits => {
                 let chunks = self.lights.chunks().len();
-                lights_differ(slots.iter().map(|&slot| self.bits(slot, chunks)))
+                let blocks = (0..chunks).step_by(BLOCK).map(|first| {
+                    let Agreement { all, any, .. } = self.agreement(slots, first);
+                    let count = (chunks - first).min(BLOCK);
+                    let ones = |bits: &[VisibilityBits]| bits.iter().map(|bits| bits.count_ones()).sum();
+                    (ones(&all[..count]), ones(&any[..count]))
+                });
+                lights_differ(blocks)
             }
             // Not a look at each light, since the cost of these must not grow with the lights.
             basis @ (Basis::Light | Basis::Irradiance) => {
@@ -124,20 +161,27 @@ struct MeanVisibility<'a> {
     points: &'a Neighbours,
     /// 1 over the sum of the points' weights.
     scale: f32,
+    agreement: Agreement,
+}
+
+impl<'a> MeanVisibility<'a> {
+    #[inline(always)]
+    fn new(estimator: &'a FieldEstimator<'a>, points: &'a Neighbours, scale: f32) -> Self {
+        let agreement = estimator.agreement(points.slots(), 0);
+        Self { estimator, points, scale, agreement }
+    }
 }
 
 impl Visibility for MeanVisibility<'_> {
     #[inline(always)]
     fn of_chunk(&mut self, index: usize) -> Option<Lanes> {
-        let Self { estimator, points, scale } = self;
+        let Self { estimator, points, scale, agreement } = self;
         let lights = estimator.lights;
         let chunks = lights.chunks().len();
-        let (mut all, mut any) = (VisibilityBits::MAX, 0);
-        for &slot in points.slots() {
-            let bits = estimator.bits(slot, chunks)[index];
-            all &= bits;
-            any |= bits;
+        if agreement.first != index / BLOCK * BLOCK {
+            *agreement = estimator.agreement(points.slots(), index / BLOCK * BLOCK);
         }
+        let (all, any) = (agreement.all[index % BLOCK], agreement.any[index % BLOCK]);
         // Most chunks are wholly hidden or wholly seen from all of D_y.
         if any == 0 {
             return None;
