@@ -170,8 +170,8 @@ pub struct CellCache {
 }
 
 impl CellCache {
-    /// The packets around a cell; `surround` writes each point that may be in the ball of some point of the cell, in a fixed order. Where much is kept already, `forget` receives all packets
-    /// before they are dropped.
+    /// The packets around a cell; `surround` writes each point that may be in the ball of some point of the cell, in a fixed
+    /// order. Where much is kept already, `forget` receives all packets before they are dropped.
     #[inline(always)]
     pub fn around(
         &mut self,

@@ -5,7 +5,7 @@ use glam::{IVec3, Vec3};
 use super::ids::{Blocks, within_range};
 use super::kernel::Kernel;
 use super::neighbours::{Nearest, Neighbours, ROW};
-use super::rounded_box::{RoundedBox, of_row};
+use super::rounded_box::{RoundedBox, numbers_in_row};
 use crate::Bounds;
 
 /// Bricks of 4×4×4 points.
@@ -123,7 +123,7 @@ impl Lattice {
         for z in first.z..=last.z {
             for y in first.y..=last.y {
                 let begin = self.at(IVec3::new(first.x, y, z));
-                let numbers = of_row(near.of_row(begin.y, begin.z), begin.x, self.inverse_spacing.x);
+                let numbers = numbers_in_row(near.of_row(begin.y, begin.z), begin.x, self.inverse_spacing.x);
                 for x in first.x + numbers.start..(first.x + numbers.end).min(last.x + 1) {
                     let cell = IVec3::new(x, y, z);
                     each(self.id(cell), self.at(cell));

@@ -11,7 +11,7 @@ use super::ids::{Blocks, within_range};
 use super::kernel::Kernel;
 use super::lattice::LayerGrid;
 use super::neighbours::{Nearest, Neighbours};
-use super::rounded_box::{RoundedBox, of_row};
+use super::rounded_box::{RoundedBox, numbers_in_row};
 use crate::Bounds;
 use crate::sampling::SplitMix64;
 
@@ -194,8 +194,10 @@ impl PeriodicPoints {
             for y in first.y..=last.y {
                 let corner = self.at(IVec3::new(first.x, y, z), Vec3::ZERO);
                 let center = corner + 0.5 * self.spacing;
-                let corners = of_row(near.of_row(corner.y, corner.z), corner.x, self.inverse_spacing.x);
-                let centers = of_row(near.of_row(center.y, center.z), center.x, self.inverse_spacing.x);
+                let corners =
+                    numbers_in_row(near.of_row(corner.y, corner.z), corner.x, self.inverse_spacing.x);
+                let centers =
+                    numbers_in_row(near.of_row(center.y, center.z), center.x, self.inverse_spacing.x);
                 let (begin, end) = (corners.start.min(centers.start), corners.end.max(centers.end));
                 let cells = first.x + begin..(first.x + end).min(last.x + 1);
                 self.for_each_of_row(cells, y, z, |x, tile, points| {

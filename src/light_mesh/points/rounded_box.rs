@@ -48,7 +48,7 @@ impl RoundedBox {
 /// Numbers of the points at `origin`, `origin` + 1/`inverse_spacing` and so on that lie in a part of their row, given that none does before `origin`. If there
 /// are none they begin at a number beyond all rows, so that another row's lowest number is lower.
 #[inline(always)]
-pub fn of_row(part: Option<(f32, f32)>, origin: f32, inverse_spacing: f32) -> Range<i32> {
+pub fn numbers_in_row(part: Option<(f32, f32)>, origin: f32, inverse_spacing: f32) -> Range<i32> {
     /// More than a layout has in a row.
     const MOST: i32 = 1 << 20;
     // Conversion to whole numbers rounds towards 0, in one instruction where rounding down takes a call on old processors.
@@ -71,7 +71,7 @@ mod tests {
         let mut counts = Vec::new();
         for row in 0..200 {
             let (y, z) = (0.4 + 0.02 * row as f32, -0.9 + 0.013 * row as f32);
-            let numbers = of_row(near.of_row(y, z), origin, 1.0 / spacing);
+            let numbers = numbers_in_row(near.of_row(y, z), origin, 1.0 / spacing);
             let expected =
                 (0..20).filter(|&number| near.holds(Vec3::new(origin + number as f32 * spacing, y, z)));
             assert_eq!(numbers.clone().collect::<Vec<_>>(), expected.collect::<Vec<_>>(), "{y} {z}");
