@@ -70,6 +70,13 @@ impl TileVisibility {
             self.settled[vertex * self.chunks + index] |= lights;
         }
     }
+
+    /// Of a light that was settled for a vertex it is known now whether it is seen.
+    pub fn unsettle(&mut self, vertex: usize, index: usize, light: usize, is_seen: bool) {
+        let at = vertex * self.chunks + index;
+        self.settled[at] &= !(1 << light);
+        self.seen[at] |= VisibilityBits::from(is_seen) << light;
+    }
 }
 
 /// Least cosine between the normals of vertices of one surface.

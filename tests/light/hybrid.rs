@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 use lightmesh::image::Image;
-use lightmesh::scene::Falloff;
 use lightmesh::scene::generate::interior::Interior;
 use lightmesh::scene::load::{LoadedScene, load_scene_file};
+use lightmesh::scene::{Falloff, Light};
 use lightmesh::settings::{Integrator, Leaks, Neighbourhood, Radius, Resolve, Spacing};
 
 use crate::common::failed::assert_images;
@@ -121,4 +121,44 @@ fn shadows_between_the_corners_of_a_patch_are_found() {
             builder.quad(Vec3::new(-2.0, 0.3, z), Vec3::Z * 0.02, Vec3::X * 4.0, 0);
         }
     });
+}
+
+/// A light that was too weak to be traced beside another is looked at again where that one turns out to be hidden. Mesh points
+/// all see a strong lamp and disagree, below a grating, about one of a 4000th of its strength. In the shadow of a band that only checks find, the
+/// weak lamp is all the light there is, so that its own shadow is to be sharp there: wrong by more than a twentieth of its light
+/// are at most a twentieth as many pixels as see it.
+#[test]
+fn weak_lights_keep_their_shadows_where_strong_ones_are_hidden() {
+    let strong = light(Vec3::new(0.3, 2.5, -2.0), Vec3::ONE);
+    let weak = light(Vec3::new(0.0, 5.6, 0.0), Vec3::splat(1.0 / 4000.0));
+    let scene = |lights: Vec<Light>| {
+        let mut builder = Builder::default();
+        builder.quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0, 0);
+        builder.quad(Vec3::new(-2.0, 0.1, -0.1), Vec3::Z * 0.2, Vec3::X * 4.0, 0);
+        for slat in -18..18 {
+            builder.quad(Vec3::new(0.11 * slat as f32, 2.8, -3.0), Vec3::Z * 6.0, Vec3::X * 0.055, 0);
+        }
+        builder.scene(vec![grey(0.8)], lights, Falloff::default())
+    };
+    let camera = camera(Vec3::new(0.0, 2.6, 2.6), Vec3::ZERO, 45.0);
+    let mut settings = settings_at((320, 320));
+    settings.mesh.direct.spacing = Spacing::Units(Vec3::splat(0.5));
+    settings.shading.kernel.neighbourhood = Neighbourhood::Sphere;
+    settings.shading.kernel.leaks = Leaks::Allow;
+    settings.shading.resolve = Resolve::Trace;
+    let strong_alone = conventional(&scene(vec![strong.clone()]), &camera, &settings).0;
+    let both = scene(vec![strong, weak]);
+    let (reference, _) = conventional(&both, &camera, &settings);
+    let (traced, _) = picture(&both, &camera, &settings);
+    let red = |image: &Image, pixel: usize| image.pixels()[pixel][0];
+    let of_band = |pixel: &usize| red(&strong_alone, *pixel) == 0.0;
+    let in_band =
+        || (0..320 * 320).filter(of_band).map(|pixel| red(&reference, pixel)).filter(|light| *light > 0.0);
+    let lit_in_band = in_band().count();
+    assert!(lit_in_band > 500, "the test shows nothing: {lit_in_band} pixels");
+    let off = 0.05 * in_band().sum::<f32>() / lit_in_band as f32;
+    let is_wrong = |pixel: &usize| (red(&traced, *pixel) - red(&reference, *pixel)).abs() > off;
+    let wrong = (0..320 * 320).filter(of_band).filter(is_wrong).count();
+    let problem = format_args!("{wrong} pixels are wrong where {lit_in_band} see the weak lamp");
+    assert_images(wrong * 20 < lit_in_band, &traced, &reference, problem);
 }

@@ -1,15 +1,17 @@
 //! Hybrid shadows (method §4): the mesh says which lights a place sees, which not, and which are open; rays answer what is
 //! open, and look for where the mesh is wrong.
 //!
-//! A tile is shaded in two passes. [`prior`](prior::Prior) goes from patch to patch, a patch being up to 16 surface points of one
+//! A tile is shaded in three passes. [`prior`](prior::Prior) goes from patch to patch, a patch being up to 16 surface points of one
 //! square of pixels, and sorts the lights by what the mesh points around it see. [`trace`](trace::LightTracer) then
-//! goes from light to light and traces, for the whole tile at once, what has to be.
+//! goes from light to light and traces, for the whole tile at once, what has to be. [`weak`](weak::WeakLights) looks again at
+//! lights that were too weak to be traced beside others, where those turned out to be hidden.
 
 mod patch;
 mod places;
 mod prior;
 mod strengths;
 mod trace;
+mod weak;
 
 use glam::Vec3;
 
@@ -45,18 +47,20 @@ pub(super) fn shade_hybrid<A: Accel>(
     if lights.is_empty() || vertices.is_empty() {
         return ShadeCounters::default();
     }
-    let (mut groups, mut error) = parts.map_or((None, None), |parts| parts.of_direct());
+    let (mut groups, error) = parts.map_or((None, None), |parts| parts.of_direct());
     let mut patches = Patch::cut(tile, vertices);
     let mut prior = Prior::new(mesh, interpolation.tolerance);
     for patch in &mut patches {
-        let error = error.as_deref_mut().and_then(|error| error.get_mut(patch.vertices.clone()));
-        prior.add(patch, vertices, scratch, error);
+        prior.add(patch, vertices, scratch);
     }
     // What single lights come to matters for edges within pixels, and for groups of lights.
     let is_asked = !paths.origins.is_empty() || groups.is_some();
     let mut visibility = is_asked.then(|| prior.visibility(&patches, vertices.len()));
     let tracer = LightTracer::new(accel, lights, tile, &mut patches, &prior, visibility.as_mut());
     let mut counters = tracer.trace(vertices);
+    let (weak, tolerance) = (prior.weak_lights(), interpolation.tolerance);
+    counters.shadow_rays +=
+        weak.look_again(accel, lights, &mut patches, tolerance, visibility.as_mut(), error);
     for patch in &patches {
         let points = &mut light[patch.vertices.clone()];
         for (lane, light) in points.iter_mut().enumerate() {

@@ -1,8 +1,7 @@
 //! What the mesh says of the lights, patch by patch, and what follows from it without a ray.
 
-use glam::Vec3;
-
 use super::patch::Patch;
+use super::weak::{WeakLight, WeakLights};
 use crate::light_mesh::direct::{DirectView, Witnesses};
 use crate::light_mesh::lookup::LookupScratch;
 use crate::lights::VisibilityBits;
@@ -35,6 +34,7 @@ pub struct Prior<'a> {
     lit: Vec<VisibilityBits>,
     open: Vec<VisibilityBits>,
     weak: Vec<VisibilityBits>,
+    weak_lights: WeakLights,
     /// By chunk: lights that are open in some patch.
     open_anywhere: Vec<VisibilityBits>,
     witnesses: Witnesses,
@@ -61,6 +61,7 @@ impl<'a> Prior<'a> {
             lit: Vec::new(),
             open: Vec::new(),
             weak: Vec::new(),
+            weak_lights: WeakLights::default(),
             open_anywhere: vec![0; chunks],
             witnesses: Witnesses::default(),
             doubts: Vec::new(),
@@ -70,15 +71,9 @@ impl<'a> Prior<'a> {
     /// Sorts the lights for the next patch, and adds to its light what needs no ray.
     ///
     /// Of the lights on which mesh points disagree the weakest are not traced, as long as what they may be wrong by sums up to no
-    /// more than [`WEAK_PART`] of `tolerance`, as a share of the light of any point. What that is of each point is added to `error`, if anybody asks.
+    /// more than [`WEAK_PART`] of `tolerance`, as a share of the light of any point.
     #[inline(always)]
-    pub fn add(
-        &mut self,
-        patch: &mut Patch,
-        vertices: &[PathVertex],
-        scratch: &mut LookupScratch,
-        mut error: Option<&mut [Vec3]>,
-    ) {
+    pub fn add(&mut self, patch: &mut Patch, vertices: &[PathVertex], scratch: &mut LookupScratch) {
         let Self { mesh, tolerance, witnesses, doubts, .. } = self;
         let lights = mesh.estimator.lights;
         let surfaces = vertices[patch.vertices.clone()].iter().map(|vertex| &vertex.surface);
@@ -139,13 +134,11 @@ impl<'a> Prior<'a> {
             }
             let intensity = lights.intensity(*index, *light).map(|channel| channel * share);
             patch.add_light(intensity, factors);
-            if let Some(error) = &mut error {
-                let most = Vec3::from(lights.intensity(*index, *light)) * share.max(1.0 - share);
-                error.iter_mut().zip(factors).for_each(|(error, factor)| *error += most * *factor);
-            }
+            self.weak_lights.add(lights, WeakLight { index: *index, light: *light, share: *share }, factors);
             self.open[row + index] &= !(1 << light);
             self.weak[row + index] |= 1 << light;
         }
+        self.weak_lights.end_patch();
         for (anywhere, open) in self.open_anywhere.iter_mut().zip(&self.open[row..]) {
             *anywhere |= open;
         }
@@ -166,6 +159,11 @@ impl<'a> Prior<'a> {
             }
         }
         visibility
+    }
+
+    /// The lights that weren't traced because they are weak.
+    pub fn weak_lights(&self) -> &WeakLights {
+        &self.weak_lights
     }
 
     /// The share of open lights among those that any mesh point sees, over all patches.
