@@ -79,7 +79,7 @@ pub enum CommandError {
         source: RenderError,
     },
     /// A scene has no camera of that name.
-    #[error("{}: no camera is named `{name}`{}; there are: {names}", scene.display(), hint(name, names.split(", ")))]
+    #[error("{}: no camera is named `{name}`{}; {}", scene.display(), hint(name, names.split(", ")), there_are(names))]
     NoSuchCamera {
         /// The scene file.
         scene: PathBuf,
@@ -295,6 +295,11 @@ fn without_number(error: &dyn Error) -> String {
         Some((before, Some((_, after)))) => format!("{before}{after}"),
         _ => text,
     }
+}
+
+/// The cameras of a scene by name.
+fn there_are(names: &str) -> String {
+    if names.is_empty() { "its cameras have no names".into() } else { format!("there are: {names}") }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
-use crate::lights::{IncidentLights, PackedLights};
+use crate::lights::{IncidentLights, LightChunk, PackedLights};
 use crate::sampling::hash_to_unit_cube;
 use crate::scene::{Falloff, Ray, SurfacePoint};
 use crate::simd::{LANES, Lanes};
@@ -65,7 +65,7 @@ impl DirectLight {
     ) -> (Vec3, f32) {
         self.unoccluded.clear();
         for surface in surfaces {
-            self.add_unoccluded(lights, surface);
+            self.add_unoccluded(lights, surface, Square::POINT);
         }
         let count = lights.chunks().len() * LANES;
         self.row = count;
@@ -119,22 +119,23 @@ impl DirectLight {
     }
 
     #[inline(always)]
-    fn add_unoccluded(&mut self, lights: &PackedLights, surface: &SurfacePoint) {
+    fn add_unoccluded(&mut self, lights: &PackedLights, surface: &SurfacePoint, square: Square) {
         let amounts = &mut self.unoccluded;
-        lights.incident_at(surface.position, &mut Unoccluded { lights, surface, amounts });
+        lights.incident_at(surface.position, &mut Unoccluded { lights, surface, square, amounts });
     }
 
-    /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface. `None` if none lies
+    /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface, as part of a square. `None` if none lies
     /// above its horizon.
     #[inline(always)]
     pub fn choose(
         &mut self,
         lights: &PackedLights,
         surface: &SurfacePoint,
+        square: Square,
         number: f32,
     ) -> Option<Candidate> {
         self.unoccluded.clear();
-        self.add_unoccluded(lights, surface);
+        self.add_unoccluded(lights, surface, square);
         let sum = self.unoccluded.iter().sum::<f32>();
         let mut left = number * sum;
         let chosen = self.unoccluded.iter().position(|&amount| {
@@ -158,13 +159,59 @@ impl DirectLight {
 /// What a square of the given width gets on average of what a single point gets from a light at a distance, given squared (see
 /// [`DirectLight::at`]).
 #[inline(always)]
-pub fn of_square(lights: &PackedLights, squared: f32, width: f32) -> f32 {
+fn of_square(lights: &PackedLights, squared: f32, width: f32) -> f32 {
     let near = width * width / (2.0 * PI);
     // Further away they are the same to a part in a million.
     if lights.falloff() == Falloff::InverseSquare && squared < 1e3 * near {
         squared / squared.hypot(near)
     } else {
         1.0
+    }
+}
+
+/// A square of surface that one ray stands for, wherever in it the ray ends.
+///
+/// Close to a light of inverse-square falloff the point may get many times what the square gets on average, or nearly nothing beside the light's foot. So
+/// lights are lifted: one at height h above the surface counts as if it were at √(h² + w²/2π). As it comes down, the point below it gets what a
+/// disc of area w² gets from it on average, and all of the surface gets as much light as before, which no limit on single points keeps.
+#[derive(Clone, Copy, Debug)]
+pub struct Square {
+    /// w²/2π, 0 where the falloff is another.
+    lift: f32,
+}
+
+/// Lift over squared distance beyond which nothing changes but the size of numbers.
+const MOST_LIFTED: f32 = 1e12;
+
+/// Lights closer to the horizon are not lifted: rounding would decide what they give.
+const LEAST_COSINE: f32 = 1e-4;
+
+impl Square {
+    /// Of no width.
+    pub const POINT: Self = Self { lift: 0.0 };
+
+    /// Of the given width, under some lights.
+    #[inline(always)]
+    pub fn new(lights: &PackedLights, width: f32) -> Self {
+        let inverse_square = lights.falloff() == Falloff::InverseSquare;
+        Self { lift: if inverse_square { width * width / (2.0 * PI) } else { 0.0 } }
+    }
+
+    /// What takes the place of the cosine at a light's squared distance.
+    #[inline(always)]
+    fn cosine(self, cosine: f32, squared: f32) -> f32 {
+        let lifted = (self.lift / squared.max(f32::MIN_POSITIVE)).min(MOST_LIFTED);
+        let beyond = 1.0 / (1.0 + lifted);
+        (cosine * cosine + lifted).sqrt() * beyond * beyond.sqrt()
+    }
+
+    /// What light from a lane of a chunk that was found for a point above whose horizon it lies is multiplied by.
+    #[inline(always)]
+    pub fn factor(self, chunk: &LightChunk, lane: usize, surface: &SurfacePoint) -> f32 {
+        let way = Vec3::from_array(chunk.to_light(lane, surface.position.to_array()));
+        let squared = way.length_squared();
+        let cosine = surface.shading_normal.dot(way) / squared.sqrt().max(f32::MIN_POSITIVE);
+        if cosine > LEAST_COSINE { self.cosine(cosine, squared) / cosine } else { 1.0 }
     }
 }
 
@@ -175,20 +222,24 @@ const HIDDEN: f32 = 0.2;
 struct Unoccluded<'a> {
     lights: &'a PackedLights,
     surface: &'a SurfacePoint,
+    square: Square,
     amounts: &'a mut Vec<f32>,
 }
 
 impl IncidentLights for Unoccluded<'_> {
     #[inline(always)]
     fn chunk(&mut self, index: usize, direction: &[Lanes; 3], reciprocal: &Lanes) {
-        let [r, g, b] = &self.lights.chunks()[index].intensity;
+        let chunk = &self.lights.chunks()[index];
+        let [r, g, b] = &chunk.intensity;
         let (n, h) = (self.surface.shading_normal, self.surface.geometric_normal);
+        let squared = chunk.squared_distances(self.surface.position);
         let mut amounts = [0.0; LANES];
         for lane in 0..LANES {
             let [x, y, z] = [direction[0][lane], direction[1][lane], direction[2][lane]];
             let cosine = n.x * x + n.y * y + n.z * z;
             let side = h.x * x + h.y * y + h.z * z;
-            let lit = if side > 0.0 && cosine > 0.0 { cosine } else { 0.0 };
+            let lifted = self.square.cosine(cosine, squared[lane]);
+            let lit = if side > 0.0 && cosine > 0.0 { lifted } else { 0.0 };
             amounts[lane] = (r[lane] + g[lane] + b[lane]) * reciprocal[lane] * lit;
         }
         self.amounts.extend_from_slice(&amounts);
@@ -248,9 +299,10 @@ mod tests {
         let lights = lights(60);
         let surface = SurfacePoint::flat(Vec3::new(0.1, 0.0, 0.2), Vec3::Y);
         let (mut direct, mut found, numbers) = (DirectLight::default(), Vec3::ZERO, 5000);
+        let square = Square::new(&lights, 0.0);
         for number in 0..numbers {
             let number = (number as f32 + 0.5) / numbers as f32;
-            let chosen = direct.choose(&lights, &surface, number).expect("lights above");
+            let chosen = direct.choose(&lights, &surface, square, number).expect("lights above");
             let (chunk, lane) = (chosen.light as usize / LANES, chosen.light as usize % LANES);
             let intensity = Vec3::from_array(lights.intensity(chunk, lane));
             found += intensity * lights.factor(chunk, lane, &surface) * chosen.weight / numbers as f32;
@@ -258,7 +310,7 @@ mod tests {
         let expected = lights.irradiance(&surface, AllSeen);
         assert!((found / expected - 1.0).abs().max_element() < 0.005, "{found} for {expected}");
         let below = SurfacePoint::flat(Vec3::ZERO, Vec3::NEG_Y);
-        assert!(direct.choose(&lights, &below, 0.5).is_none());
+        assert!(direct.choose(&lights, &below, square, 0.5).is_none());
     }
 
     /// At the foot of a lamp, low above the floor, a point gets what a disc around it gets on average: 2I/a² · (1 − h/√(h² + a²)), with
@@ -273,6 +325,29 @@ mod tests {
             let found = DirectLight::default().at(&nothing(), &lights, &floor, width).x;
             let squared = width * width / PI;
             let expected = 2.0 / squared * (1.0 - height / (height * height + squared).sqrt());
+            assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected} at {height}");
+        }
+    }
+
+    /// However low a lamp is above a floor, and however few rays end on that, on average they bring along all that it sends there: the solid angle of a
+    /// square of edge 2a from height h above its middle, 4 atan(a²/(h √(2a² + h²))).
+    #[test]
+    fn low_lamps_give_a_floor_what_they_send() {
+        let (width, count) = (0.4f32, 30);
+        for height in [0.003f32, 0.1, 0.5] {
+            let lamp = Light::point(Vec3::new(0.0, height, 0.0), Vec3::ONE);
+            let lights = PackedLights::new(&[lamp], Falloff::InverseSquare, 0.0);
+            let square = Square::new(&lights, width);
+            // Five by five rays in each square.
+            let place = |i: i32| ((i as f32 + 0.5) / 5.0 - 0.5 * count as f32) * width;
+            let light = |i: i32| {
+                let place = Vec3::new(place(i % (5 * count)), 0.0, place(i / (5 * count)));
+                let surface = SurfacePoint::flat(place, Vec3::Y);
+                lights.factor(0, 0, &surface) * square.factor(&lights.chunks()[0], 0, &surface)
+            };
+            let found = (0..25 * count * count).map(light).sum::<f32>() * width * width / 25.0;
+            let a = 0.5 * width * count as f32;
+            let expected = 4.0 * (a * a / (height * (2.0 * a * a + height * height).sqrt())).atan();
             assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected} at {height}");
         }
     }

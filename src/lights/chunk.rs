@@ -85,6 +85,20 @@ impl LightChunk {
         [0, 1, 2].map(|axis| self.position[axis][lane] - local * x[axis])
     }
 
+    /// Squared length of the ways from `x` to the lights.
+    #[inline(always)]
+    pub fn squared_distances(&self, x: Vec3) -> Lanes {
+        let mut squared = [0.0; LANES];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let local = self.kinds.as_ref().map_or(1.0, |kinds| kinds.local[lane]);
+                let way = self.position[axis][lane] - local * x[axis];
+                squared[lane] += way * way;
+            }
+        }
+        squared
+    }
+
     /// The light in a lane, if it is part of a lamp that has a size.
     #[inline(always)]
     pub fn lamp(&self, lane: usize) -> Option<&LampShape> {

@@ -11,7 +11,7 @@ use super::sensor::Values;
 use super::station::Station;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::light_mesh::MeshError;
-use crate::light_mesh::direct_light::{Candidate, DirectLight, of_square};
+use crate::light_mesh::direct_light::{Candidate, DirectLight, Square};
 use crate::light_mesh::surface::{SurfaceMesh, SurfaceView};
 use crate::render::surface_width;
 use crate::sampling::hash_to_unit_cube;
@@ -187,16 +187,16 @@ impl<A: Accel> Gather<'_, A> {
     fn direct_light(&self, end: &End, number: f32, scratch: &mut DirectLight) -> Vec3 {
         let World { accel, lights, .. } = self.world;
         let surface = &end.seen.point;
-        let Some(Candidate { light, weight }) = scratch.choose(lights, surface, number) else {
+        // The ray stands for a part of the surface.
+        let square = Square::new(lights, end.distance * (4.0 * PI / self.directions as f32).sqrt());
+        let Some(Candidate { light, weight }) = scratch.choose(lights, surface, square, number) else {
             return Vec3::ZERO;
         };
         let (index, lane) = (light as usize / LANES, light as usize % LANES);
         let origin = surface.ray_origin();
         let way = Vec3::from_array(lights.chunks()[index].way(lane, origin.to_array(), origin, 0));
-        // The ray stands for a part of the surface.
-        let footprint = end.distance * (4.0 * PI / self.directions as f32).sqrt();
-        let factor =
-            lights.factor(index, lane, surface) * weight * of_square(lights, way.length_squared(), footprint);
+        let lifted = square.factor(&lights.chunks()[index], lane, surface);
+        let factor = lights.factor(index, lane, surface) * weight * lifted;
         let offered = Vec3::from_array(lights.intensity(index, lane)) * factor;
         let ray = Ray { t_far: 1.0, ..Ray::new(origin, way) };
         // What no number can hold, next to a light of enormous intensity, is left out.

@@ -66,7 +66,7 @@ impl IndirectSettings {
     pub const COARSENESS: f32 = 2.0;
 
     /// Bounces after which hardly any light is left.
-    pub const ALL_BOUNCES: u32 = 16;
+    pub const ALL_BOUNCES: u32 = 64;
 
     /// Points for indirect light, given those for direct light.
     pub fn coarser_points(points: &PointSettings) -> PointSettings {

@@ -146,7 +146,7 @@ fn weak_lights_keep_their_shadows_where_strong_ones_are_hidden() {
     settings.shading.kernel.neighbourhood = Neighbourhood::Sphere;
     settings.shading.kernel.leaks = Leaks::Allow;
     settings.shading.resolve = Resolve::Trace;
-    let strong_alone = conventional(&scene(vec![strong.clone()]), &camera, &settings).0;
+    let strong_alone = conventional(&scene(vec![strong]), &camera, &settings).0;
     let both = scene(vec![strong, weak]);
     let (reference, _) = conventional(&both, &camera, &settings);
     let (traced, _) = picture(&both, &camera, &settings);

@@ -86,8 +86,16 @@ pub fn anchor(bounds: Bounds, spacing: Vec3) -> Vec3 {
     corner + Vec3::from_array(spacing.to_array().map(octave)) * PHASE
 }
 
-/// Whether a spacing is too fine for single-precision coordinates over `bounds`, with fewer than 16 representable numbers
-/// between neighbouring points, or for ids.
+/// The finest spacing that single-precision coordinates over `bounds` allow, with 16 representable numbers between neighbouring points.
+pub fn finest(bounds: Bounds) -> f32 {
+    if bounds.is_empty() {
+        0.0
+    } else {
+        16.0 * f32::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element()
+    }
+}
+
+/// Whether a spacing is too fine for single-precision coordinates over `bounds`, along each axis, or for ids.
 pub fn too_fine(bounds: Bounds, spacing: Vec3) -> bool {
     let largest = bounds.min.abs().max(bounds.max.abs());
     let fits = (largest * (16.0 * f32::EPSILON)).cmple(spacing)

@@ -3,6 +3,7 @@
 use glam::{UVec3, Vec3};
 
 use super::cells::{CellCache, PacketWriter, PointPacket, Surroundings};
+use super::ids::finest;
 use super::kernel::Kernel;
 use super::neighbours::Neighbours;
 use super::point_set::{MeshError, PointSet};
@@ -72,7 +73,7 @@ impl Neighbourhoods {
                 Vec3::splat(levels.first().map_or(diagonal, |level| level.spacing))
             }
             (Spacing::Auto, AutoSpacing::Scene { spacings }) if diagonal > 0.0 => {
-                Vec3::splat(diagonal / spacings)
+                Vec3::splat((diagonal / spacings).max(finest(bounds)))
             }
             _ => Vec3::ONE,
         };
@@ -287,8 +288,10 @@ fn ring_levels(bounds: Bounds, footprint: PixelFootprint) -> Vec<RingLevel> {
     let diagonal = bounds.extent().length();
     let farthest = (bounds.min - footprint.eye).abs().max((bounds.max - footprint.eye).abs()).length();
     let exponent = |spacing: f32| spacing.log2().floor() as i32;
-    let last = exponent((farthest * per_distance).min(diagonal / SPACINGS[0]));
-    let first = exponent(diagonal / SPACINGS[1]).min(last);
+    // Far from the origin, finer points would have one coordinate.
+    let least = exponent(finest(bounds)) + 1;
+    let last = exponent((farthest * per_distance).min(diagonal / SPACINGS[0])).max(least);
+    let first = exponent(diagonal / SPACINGS[1]).max(least).min(last);
     (first..=last)
         .map(|exponent| {
             let spacing = (exponent as f32).exp2();
@@ -328,6 +331,7 @@ impl Zone {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ids::too_fine;
     use super::*;
 
     /// Where a ring begins its spacing is at most [`PIXELS`] pixels, and more than half as many where it ends; spacings are
@@ -345,6 +349,18 @@ mod tests {
                 assert!((pixels(level.begin) - PIXELS).abs() < 1e-3 * PIXELS);
                 assert!((pixels(next.begin) - 0.5 * PIXELS).abs() < 1e-3 * PIXELS);
             }
+        }
+    }
+
+    /// However far from the origin a scene lies, its spacings are such as coordinates can hold.
+    #[test]
+    fn rings_far_from_the_origin_are_no_finer_than_coordinates() {
+        for far in [1e2, 1e4, 1e6] {
+            let bounds = Bounds { min: Vec3::splat(far), max: Vec3::splat(far + 8.0) };
+            let footprint = PixelFootprint { eye: Vec3::splat(far + 4.0), edge: 1e-3 };
+            let levels = ring_levels(bounds, footprint);
+            assert!(!levels.is_empty());
+            assert!(levels.iter().all(|level| !too_fine(bounds, Vec3::splat(level.spacing))), "{far}");
         }
     }
 }

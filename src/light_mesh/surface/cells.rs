@@ -226,10 +226,34 @@ fn stands_on(other: &SurfacePoint, point: &SurfacePoint, width: f32) -> bool {
     height > LAYER * width && other.geometric_normal.dot(point.geometric_normal).abs() < SAME_WAY
 }
 
+/// Takes those of some points away that have something close above them, lower than the lines between points run, unless all do: what
+/// lies under a rug is seen by nothing, and would pass for a part of the rug. Returns the number of rays.
+fn uncover<A: Accel>(accel: &A, points: &mut Vec<SurfacePoint>, width: f32) -> u64 {
+    let mut open = Vec::with_capacity(points.len());
+    for points in points.chunks(LINES) {
+        let mut packet = RayPacket::<LINES>::empty();
+        for (lane, point) in points.iter().enumerate() {
+            let way = point.geometric_normal * (LIFT * width);
+            packet.set_lane(lane, &Ray { t_far: 1.0, ..Ray::new(point.ray_origin(), way) });
+        }
+        let active: LaneMask = (1 << points.len()) - 1;
+        let blocked = accel.occluded_packet(active, &mut packet, Coherence::Coherent);
+        open.extend(
+            points.iter().enumerate().filter(|(lane, _)| blocked >> lane & 1 == 0).map(|(_, point)| *point),
+        );
+    }
+    let rays = points.len() as u64;
+    if !open.is_empty() {
+        *points = open;
+    }
+    rays
+}
+
 /// Adds points for one surface, several if they don't see each other; returns the number of rays.
 fn divide<A: Accel>(accel: &A, surface: Vec<SurfacePoint>, width: f32, out: &mut Vec<CellPoint>) -> u64 {
     let mut groups: Vec<Vec<SurfacePoint>> = Vec::new();
-    let (mut left, mut rays) = (surface, 0);
+    let mut left = surface;
+    let mut rays = uncover(accel, &mut left, width);
     while !left.is_empty() && groups.len() < MOST_DIVISIONS {
         let middle = left.iter().map(|point| point.position).sum::<Vec3>() / left.len() as f32;
         let distance = |point: &SurfacePoint| point.position.distance_squared(middle);
@@ -318,6 +342,22 @@ mod tests {
     #[test]
     fn an_empty_cell_has_no_points() {
         assert!(points(&[(Vec3::splat(5.0), Vec3::X, Vec3::Z)]).is_empty());
+    }
+
+    /// What lies under a rug is not seen, and no point stands for it: that which faces up lies on the rug, however thin that is.
+    #[test]
+    fn what_lies_under_a_rug_has_no_point() {
+        for height in [0.01, 0.05, 0.2] {
+            let rug = (FLOOR.0 + Vec3::new(middle().x, height, middle().z), Vec3::X, Vec3::Z);
+            let points = points(&[FLOOR, rug]);
+            let up: Vec<f32> = points
+                .iter()
+                .filter(|point| point.surface.shading_normal.y > 0.5)
+                .map(|point| point.surface.position.y)
+                .collect();
+            assert!(up.contains(&height), "{up:?} at {height}");
+            assert!(height > LIFT || up.len() == 1, "{up:?} at {height}");
+        }
     }
 
     /// Both sides of a floor have a point near the middle of the cell, and there is nothing to ask about.

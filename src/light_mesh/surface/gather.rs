@@ -13,7 +13,7 @@ use super::gathered::{Gathered, GatheredRay};
 use super::last_place::LastPlace;
 use super::points::{NO_POINT, SurfacePoints};
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
-use crate::light_mesh::direct_light::{Candidate, DirectLight, of_square};
+use crate::light_mesh::direct_light::{Candidate, DirectLight, Square};
 use crate::light_mesh::packed_colour::PackedColour;
 use crate::sampling::hash_to_unit_cube;
 use crate::scene::{Ray, SurfacePoint};
@@ -170,8 +170,10 @@ impl<A: Accel> Gather<'_, A> {
                 part.direct[ray] = reflected * light.mean;
                 continue;
             }
+            // A ray stands for a part of the surface.
+            let square = Square::new(lights, self.footprint(*distance));
             let chosen = match adviser[lane] {
-                NO_POINT => part.scratch.choose(lights, surface, *number),
+                NO_POINT => part.scratch.choose(lights, surface, square, *number),
                 adviser => points.light(adviser).and_then(|light| light.choose(*number)),
             };
             let Some(Candidate { light, weight }) = chosen else { continue };
@@ -182,8 +184,7 @@ impl<A: Accel> Gather<'_, A> {
             }
             let origin = surface.ray_origin();
             let way = Vec3::from_array(lights.chunks()[chunk].way(index, origin.to_array(), origin, 0));
-            // A ray stands for a part of the surface.
-            factor *= of_square(lights, way.length_squared(), self.footprint(*distance));
+            factor *= square.factor(&lights.chunks()[chunk], index, surface);
             offered[lane] = reflected * Vec3::from_array(lights.intensity(chunk, index)) * factor;
             // What no number can hold, next to a light of enormous intensity, is left out.
             if offered[lane].is_finite() {
