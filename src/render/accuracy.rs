@@ -205,7 +205,7 @@ impl fmt::Display for Accuracy {
                 write!(f, "; the {asked} % asked for are within its interval")?
             }
             Ending::Error => write!(f, "; within the {asked} % asked for")?,
-            Ending::Settings => write!(f, "; asked for {asked} %, but spacing and estimator are given")?,
+            Ending::Settings => write!(f, "; asked for {asked} %, but the settings leave nothing to choose")?,
             Ending::Settled => {
                 write!(f, "; asked for {asked} %, but the light mesh was chosen for several views together")?
             }

@@ -286,6 +286,10 @@ fn a_scene_without_camera_or_geometry_says_so() {
         let error = load_in(&folder, text).err().expect("incomplete").to_string();
         assert!(error.contains(&format!("{key}: is ")), "{error}");
     }
+    // It is no key of what the file begins with.
+    let error =
+        load_in(&folder, &format!("preset = \"physical\"\n{CAMERA}")).err().expect("incomplete").to_string();
+    assert!(error.contains(":1: geometry: is "), "{error}");
 }
 
 #[test]

@@ -46,7 +46,11 @@ impl<'a> Places<'a> {
         let Ok(table) = DeTable::parse(self.text) else {
             return LoadError::Line { file, line, problem: message };
         };
-        let mut key = key_at(table.get_ref(), offset, String::new());
+        // What the file itself lacks is no matter of the key that it begins with.
+        let is_whole = error.span().is_none_or(|span| {
+            span.start == 0 && (span.is_empty() || span.end >= self.text.trim_end().len())
+        });
+        let mut key = if is_whole { String::new() } else { key_at(table.get_ref(), offset, String::new()) };
         let (name, problem) = missing_or_unknown(&message);
         if let Some(name) = name
             && key != name
