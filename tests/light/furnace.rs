@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 use lightmesh::scene::{Falloff, Material};
-use lightmesh::settings::{IndirectForm, IndirectSettings, Normalization, Spacing};
+use lightmesh::settings::{IndirectForm, IndirectSettings, Integrator, Normalization, Spacing};
 
-use crate::common::{Builder, camera, picture, settings_at};
+use crate::common::{Builder, camera, grey, light, picture, settings_at};
 
 /// The pixels of a picture inside of a closed box whose walls all emit `emission` and reflect `albedo`.
 fn furnace(
@@ -82,4 +82,30 @@ fn the_integral_is_four_pi_times_the_mean() {
     let pixels = furnace(0.7, 0.5, once, Normalization::Integral);
     let expected = 0.7 * (1.0 + 0.5 * 4.0 * std::f32::consts::PI);
     assert_all_within_one_percent(&pixels, expected, "integral");
+}
+
+/// A second floor close above a room's own hides that, so that the room is one whose floor lies as high, however thin the gap is. If the hidden
+/// floor passed for what is seen, all of its darkness would, and a room of albedo 0.8 would lack a quarter of its light.
+#[test]
+fn what_lies_under_a_second_floor_darkens_no_room() {
+    let mean = |floors: &[f32]| {
+        let mut builder = Builder::default();
+        builder.cuboid(Vec3::new(-1.0, floors[0], -1.0), Vec3::new(1.0, 1.5, 1.2), true, 0);
+        for &height in &floors[1..] {
+            builder.quad(Vec3::new(-1.0, height, -1.0), Vec3::Z * 2.2, Vec3::X * 2.0, 0);
+        }
+        let lamp = light(Vec3::new(0.1, 0.4, 0.0), Vec3::ONE);
+        let scene = builder.scene(vec![grey(0.8)], vec![lamp], Falloff::InverseSquare);
+        let mut settings = settings_at((24, 24));
+        settings.shading.integrator = Integrator::Conventional;
+        settings.mesh.indirect = Some(indirect(IndirectForm::Surface));
+        let camera = camera(Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.2, -0.3, -1.0), 90.0);
+        let image = picture(&scene, &camera, &settings).0;
+        image.pixels().as_flattened().iter().sum::<f32>() / (3 * image.pixels().len()) as f32
+    };
+    let plain = mean(&[-1.0]);
+    for gap in [0.004, 0.02, 0.1] {
+        let found = mean(&[-1.0 - gap, -1.0]);
+        assert!((found / plain - 1.0).abs() < 0.02, "{found} for {plain}, {gap} above");
+    }
 }
