@@ -7,11 +7,12 @@ use glam::Vec3;
 use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
-use super::cells::{Cell, line_between};
+use super::cells::Cell;
 use super::directions::HemisphereDirections;
 use super::gathered::{Gathered, GatheredRay};
 use super::last_place::LastPlace;
 use super::points::{NO_POINT, SurfacePoints};
+use super::survey::line_between;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
 use crate::light_mesh::direct_light::{Candidate, DirectLight, Square};
 use crate::light_mesh::packed_colour::PackedColour;

@@ -6,7 +6,7 @@ use super::points::SurfacePoints;
 use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayPacket};
 use crate::scene::SurfacePoint;
 
-use super::cells::line_between;
+use super::survey::line_between;
 
 /// Radius of the kernel in widths of a cell.
 const RADIUS: f32 = 2.0;

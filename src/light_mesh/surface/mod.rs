@@ -14,6 +14,7 @@ mod saved;
 mod saved_points;
 mod solve;
 mod sources;
+mod survey;
 
 pub use mesh::{SurfaceEvaluation, SurfaceMesh, SurfaceView};
 pub(crate) use saved::SavedSurfaceMesh;

@@ -7,8 +7,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::cell_light::CellLight;
-use super::cells::{Cell, CellPoint, Cells, line_between, survey};
+use super::cells::{Cell, CellPoint, Cells};
 use super::last_place::LastPlace;
+use super::survey::{line_between, survey};
 use crate::accel::Accel;
 use crate::light_mesh::direct_light::DirectLight;
 use crate::sampling::{BuildKeyHasher, mix};
