@@ -124,8 +124,8 @@ impl DirectLight {
         lights.incident_at(surface.position, &mut Unoccluded { lights, surface, square, amounts });
     }
 
-    /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface, as part of a square. `None` if none lies
-    /// above its horizon.
+    /// The light that a number in [0, 1) chooses: evenly spread numbers choose lights by what they would give the surface, which stands for a square.
+    /// `None` if none lies above its horizon.
     #[inline(always)]
     pub fn choose(
         &mut self,

@@ -86,19 +86,19 @@ pub fn anchor(bounds: Bounds, spacing: Vec3) -> Vec3 {
     corner + Vec3::from_array(spacing.to_array().map(octave)) * PHASE
 }
 
-/// The finest spacing that single-precision coordinates over `bounds` allow, with 16 representable numbers between neighbouring points.
+/// Spacing over the largest coordinate that leaves 16 representable numbers between neighbouring points.
+const PER_COORDINATE: f32 = 16.0 * f32::EPSILON;
+
+/// The finest spacing that single-precision coordinates over `bounds` allow; 0 without bounds.
 pub fn finest(bounds: Bounds) -> f32 {
-    if bounds.is_empty() {
-        0.0
-    } else {
-        16.0 * f32::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element()
-    }
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if bounds.is_empty() { 0.0 } else { PER_COORDINATE * largest }
 }
 
 /// Whether a spacing is too fine for single-precision coordinates over `bounds`, along each axis, or for ids.
 pub fn too_fine(bounds: Bounds, spacing: Vec3) -> bool {
     let largest = bounds.min.abs().max(bounds.max.abs());
-    let fits = (largest * (16.0 * f32::EPSILON)).cmple(spacing)
+    let fits = (largest * PER_COORDINATE).cmple(spacing)
         & (bounds.extent() / spacing).cmple(Vec3::splat(LONGEST_SCENE));
     !bounds.is_empty() && !fits.all()
 }
