@@ -138,7 +138,10 @@ impl Job<'_> {
         if let Some(choice) = &stats.choice {
             reporter.line(&format!("note: {choice}"));
         }
-        if let Some(error) = stats.hybrid_error.share().filter(|&error| error > settings.shading.tolerance) {
+        // Where the error was measured, that is known better.
+        let is_measured = stats.accuracy.is_some_and(|accuracy| accuracy.found.is_some());
+        let is_much = |&error: &f32| error > settings.shading.tolerance && !is_measured;
+        if let Some(error) = stats.hybrid_error.share().filter(is_much) {
             reporter.line(&format!(
                 "warning: shadows are estimated to be wrong by {:.1} % of the light: `--integrator conventional` traces them all",
                 100.0 * error

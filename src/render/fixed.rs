@@ -1,6 +1,6 @@
 //! One picture, by settings that leave nothing open.
 
-use super::choice::{choose, is_open};
+use super::choice::{WithTrial, choose, is_open};
 use super::error::RenderError;
 use super::film::TileSink;
 use super::frame::{Frame, Purpose, StopToken};
@@ -71,11 +71,14 @@ fn render_frame<A: Accel>(
         needed = NeededMemory::of(&mut frame, settings, meshes, &interpolation, &mut stats)?;
         fits = needed.iter().try_for_each(|needed| needed.check(world.lights, meshes, &interpolation));
     }
+    let mut tried = Vec::new();
     let integrator = match (settings.shading.integrator, fits) {
         (Integrator::Auto, fits) => {
-            let choice = match fits {
+            let choice;
+            (choice, tried) = match fits {
                 Err(RenderError::Memory { .. }) if is_open(settings) => {
-                    Choice { integrator: Integrator::Conventional, reason: Reason::Memory }
+                    let choice = Choice { integrator: Integrator::Conventional, reason: Reason::Memory };
+                    (choice, Vec::new())
                 }
                 fits => fits.and_then(|()| choose(&frame, camera, settings, meshes, &mut stats))?,
             };
@@ -117,7 +120,8 @@ fn render_frame<A: Accel>(
         }
         (_, Some(interpolation)) => {
             let (direct, indirect) = (&mut meshes.direct, meshes.indirect.as_ref());
-            let direct = LightMeshIntegrator { world, direct, indirect, interpolation: &interpolation };
+            let integrator = LightMeshIntegrator { world, direct, indirect, interpolation: &interpolation };
+            let direct = WithTrial { integrator, tried };
             frame.run(&mut WithSurfaceLight { direct, surface }, &mut stats)?
         }
         (_, None) => {

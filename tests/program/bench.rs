@@ -138,7 +138,8 @@ fn check_scene(scene: &Value) {
     let faster = if number("ratio") >= 1.0 { "light-mesh" } else { "conventional" };
     assert_eq!(scene["cheaper"], faster, "{name}");
     let excess = if faster == "light-mesh" { ratio } else { 1.0 / ratio };
-    assert_eq!(scene["auto_right"], scene["chosen"] == scene["cheaper"] || excess <= 1.05, "{name}");
+    let right = scene["chosen"] == scene["cheaper"] || excess <= 1.05 || scene["reason"] == "settings";
+    assert_eq!(scene["auto_right"], right, "{name}");
     for way in ["light_mesh", "conventional", "auto"] {
         for stage in ["paths", "mesh", "shade"] {
             assert!(scene["stages"][way][stage].is_number(), "{name}: {way} {stage}");

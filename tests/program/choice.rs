@@ -69,10 +69,11 @@ fn a_bare_model_is_rendered_by_what_was_chosen() {
     assert!((0.0..=stats["lights"].as_f64().expect("a number")).contains(&lights), "{lights}");
 }
 
-/// An image large enough for a trial is decided by the estimated cost of a light mesh, which is reported.
+/// An image large enough for a trial, with enough lights for one, is decided by the estimated cost of a light mesh, which is reported.
 #[test]
 fn a_trial_takes_what_it_estimates_to_cost_less() {
-    let folder = folder(&(SCENE.to_owned() + "[light_mesh]\nresolve = \"trace\"\n"));
+    let lights = "[[light]]\nposition = [0, 0.5, 2]\nintensity = 1\n".repeat(7);
+    let folder = folder(&(SCENE.to_owned() + &lights + "[light_mesh]\nresolve = \"trace\"\n"));
     let (stats, notes) = render(folder.path(), "scene.toml", &["--resolution", "320x320"]);
     check_choice(&stats, &notes);
     let share = stats["choice"]["reason"]["trial"].as_f64().expect("large enough for a trial");

@@ -11,7 +11,7 @@ use crate::bench::{BenchError, BenchOptions};
 use crate::image::Image;
 use crate::image::metrics::{MetricsOptions, compare};
 use crate::image::tone::auto_exposure;
-use crate::render::{RenderStats, StageSeconds};
+use crate::render::{Reason, RenderStats, StageSeconds};
 use crate::settings::{IndirectForm, Integrator, Settings};
 
 /// What is kept of a frame.
@@ -41,16 +41,16 @@ pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Resu
     // Pages and caches are warm for both ways. The image is as good as any later one: they are the same to the bit.
     let (image, _) = frame(&opened, Integrator::LightMesh)?;
     let mut reference = None;
-    let runs = options.budget().alternate(2, |variant| {
-        let (rendered, run) = frame(&opened, [Integrator::LightMesh, Integrator::Conventional][variant])?;
-        if variant == 1 {
+    let ways = [Integrator::LightMesh, Integrator::Conventional, Integrator::Auto];
+    let runs = options.budget().alternate(ways.len(), |variant| {
+        let (rendered, run) = frame(&opened, ways[variant])?;
+        if ways[variant] == Integrator::Conventional {
             reference = Some(rendered);
         }
         Ok::<_, BenchError>(run)
     })?;
-    let (_, auto) = frame(&opened, Integrator::Auto)?;
 
-    let [mesh_runs, conventional_runs] = [&runs[0], &runs[1]];
+    let [mesh_runs, conventional_runs, auto_runs] = [&runs[0], &runs[1], &runs[2]];
     let mut record = |way: Integrator, runs: &[Run]| {
         let mut record = |part: &str, seconds: &dyn Fn(&Run) -> f64| {
             report.record(format!("{name}: {way}: {part}"), runs.iter().map(seconds).collect())
@@ -62,7 +62,7 @@ pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Resu
     };
     let mesh = record(Integrator::LightMesh, mesh_runs);
     let conventional = record(Integrator::Conventional, conventional_runs);
-    record(Integrator::Auto, std::slice::from_ref(&auto));
+    let auto = record(Integrator::Auto, auto_runs);
 
     let Opened { setup: Setup { scene, settings, load_seconds, .. }, backend, build_seconds, bare } = opened;
     let exposure = match &reference {
@@ -74,8 +74,12 @@ pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Resu
         compare(&image, &reference, MetricsOptions { exposure, threshold: None }).ok()
     });
     let (mesh_stats, conventional_stats) = (&mesh_runs[0].stats, &conventional_runs[0].stats);
-    let chosen = auto.stats.integrator;
-    let (cheaper, auto_right) = judge(mesh.stages, conventional.stages, chosen);
+    let auto_stats = &auto_runs[0].stats;
+    let chosen = auto_stats.integrator;
+    let (cheaper, is_cheap) = judge(mesh.stages, conventional.stages, chosen);
+    // Settings that only a light mesh meets leave no choice.
+    let reason = auto_stats.choice.map(|choice| choice.reason);
+    let auto_right = is_cheap || reason == Some(Reason::Settings);
     let (width, height) = settings.view.resolution;
     Ok(SceneResult {
         name,
@@ -91,23 +95,24 @@ pub fn measure(file: &Path, options: &BenchOptions, report: &mut Report) -> Resu
         ratio: conventional.stages / mesh.stages,
         seconds: mesh.stages,
         conventional_seconds: conventional.stages,
-        frame_seconds: Ways { light_mesh: mesh.frame, conventional: conventional.frame, auto: auto.seconds },
-        auto_seconds: auto.seconds,
+        frame_seconds: Ways { light_mesh: mesh.frame, conventional: conventional.frame, auto: auto.frame },
+        auto_seconds: auto.frame,
         exposure,
         flip: metrics.as_ref().and_then(|metrics| metrics.flip),
         block_mean_relative_error: metrics.and_then(|metrics| metrics.block_mean_relative_error),
         chosen,
+        reason,
         cheaper,
         auto_right,
         stages: Ways {
             light_mesh: stage_medians(mesh_runs),
             conventional: stage_medians(conventional_runs),
-            auto: auto.stats.seconds,
+            auto: stage_medians(auto_runs),
         },
         rays: Ways {
             light_mesh: mesh_stats.rays,
             conventional: conventional_stats.rays,
-            auto: auto.stats.rays,
+            auto: auto_stats.rays,
         },
         mesh_points: mesh_stats.mesh_points,
         light_mesh_bytes: mesh_stats.light_mesh_bytes,

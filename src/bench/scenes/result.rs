@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::bench::BenchError;
-use crate::render::{MeshCounters, RayCounters, StageSeconds};
+use crate::render::{MeshCounters, RayCounters, Reason, StageSeconds};
 use crate::settings::Integrator;
 
 /// All scenes.
@@ -89,9 +89,11 @@ pub struct SceneResult {
     pub block_mean_relative_error: Option<f64>,
     /// What `auto` took.
     pub chosen: Option<Integrator>,
+    /// Why.
+    pub reason: Option<Reason>,
     /// What took less seconds.
     pub cheaper: Integrator,
-    /// Whether `auto` took what is cheaper, or dearer by at most [`TOLERANCE`].
+    /// Whether `auto` took what is cheaper, or dearer by at most [`TOLERANCE`], or had no choice.
     pub auto_right: bool,
     /// Seconds per stage.
     pub stages: Ways<StageSeconds>,
