@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::accuracy::PartError;
 use super::error::RenderError;
 use super::frame::{BlockIntegrator, Frame};
+use super::layers::LightParts;
 use super::paths::TilePaths;
 use super::stats::RenderStats;
 use super::tiles::Tile;
@@ -54,22 +55,62 @@ impl HeldOut {
         };
         let even = 1.0 / image.pixels().len() as f64;
         let sum: f64 = image.pixels().iter().map(square).sum();
-        let (width, step) = (image.width(), 1.0 / count as f64);
-        let mut held_out = Self::new(frame, 1, 0);
-        // Equal steps along the running sum of the probabilities.
-        let (mut passed, mut next) = (0.0, 0.5 * step);
-        for (number, pixel) in (0u32..).zip(image.pixels()) {
+        let chances = image.pixels().iter().map(|pixel| {
             let by_square = if sum > 0.0 { square(pixel) / sum } else { even };
-            let probability = 0.5 * (even + by_square);
-            passed += probability;
-            while passed > next {
-                held_out.tiles.push(Tile { x: number % width, y: number / width, width: 1, height: 1 });
-                held_out.weights.push(even / probability);
-                next += step;
-            }
+            0.5 * (even + by_square)
+        });
+        let width = image.width();
+        let mut held_out = Self::new(frame, 1, 0);
+        for (number, chance) in systematic(chances, count) {
+            let (x, y) = (number as u32 % width, number as u32 / width);
+            held_out.tiles.push(Tile { x, y, width: 1, height: 1 });
+            held_out.weights.push(even / chance);
         }
         held_out.trace(frame, usize::MAX)?;
         Ok(held_out)
+    }
+
+    /// Holds out `count` of these, half of them by errors that are predicted for them: where an error is to be found, and how large it is, are then
+    /// different questions. Each counts the less, the more likely it was to be taken.
+    ///
+    /// # Errors
+    /// [`RenderError::Stopped`].
+    pub fn by_prediction<A: Accel>(
+        &self,
+        frame: &Frame<A>,
+        predicted: &[f32],
+        count: usize,
+    ) -> Result<Self, RenderError> {
+        let of_picture = |(&error, weight): (&f32, &f64)| f64::from(error) * weight;
+        let shares = predicted.iter().zip(&self.weights).map(of_picture);
+        let even = 1.0 / predicted.len() as f64;
+        let sum: f64 = shares.clone().sum();
+        let chances = shares.map(|share| {
+            let by_error = if sum > 0.0 && sum.is_finite() { share / sum } else { even };
+            0.5 * (even + by_error)
+        });
+        let mut held_out = Self::new(frame, 1, 0);
+        for (number, chance) in systematic(chances, count) {
+            held_out.tiles.push(self.tiles[number]);
+            held_out.weights.push(self.weights[number] * even / chance);
+        }
+        held_out.trace(frame, usize::MAX)?;
+        Ok(held_out)
+    }
+
+    /// What an integrator estimates to be wrong with the direct light of each part, as a mean over colours and samples.
+    pub fn predicted(&self, integrator: &impl BlockIntegrator) -> Vec<f32> {
+        let predict = |(tile, paths): (&Tile, &TilePaths)| {
+            let mut parts = LightParts::of_error(paths.vertices.len());
+            let mut light = vec![Vec3::ZERO; paths.vertices.len()];
+            integrator.shade(tile, paths, &mut light, Some(&mut parts));
+            let errors = parts.error.iter().flatten();
+            let wrong: Vec3 =
+                paths.vertices.iter().zip(errors).map(|(vertex, error)| vertex.reflectance * *error).sum();
+            let wrong = wrong.abs().element_sum() / (3 * self.samples) as f32;
+            if wrong.is_finite() { wrong } else { 0.0 }
+        };
+        self.tiles.par_iter().zip(&self.paths).with_max_len(TASK).map(predict).collect()
     }
 
     /// Traces the camera paths of the next `count` parts.
@@ -125,6 +166,22 @@ impl HeldOut {
     pub fn is_traced(&self) -> bool {
         self.paths.len() == self.tiles.len()
     }
+}
+
+/// Takes `count` of some things by their chances, whose sum is 1, in equal steps along the running sum; those with large ones more than once. Gives the
+/// number and the chance of each.
+fn systematic(chances: impl Iterator<Item = f64>, count: usize) -> Vec<(usize, f64)> {
+    let step = 1.0 / count as f64;
+    let (mut passed, mut next) = (0.0, 0.5 * step);
+    let mut taken = Vec::new();
+    for (number, chance) in chances.enumerate() {
+        passed += chance;
+        while passed > next {
+            taken.push((number, chance));
+            next += step;
+        }
+    }
+    taken
 }
 
 /// Pixels of a part, means over the samples, and the rays that they took.
@@ -193,5 +250,21 @@ mod tests {
             let first: HashSet<(bool, bool)> = tiles.iter().take(8).map(quarter).collect();
             assert!(first.len() == 4 || tiles.len() < 8);
         }
+    }
+
+    /// What is taken by unequal chances and counts the less for them has the mean of all: here one thing in a hundred is large, with a
+    /// third of the sum, and half of (1/100 + 1/3) of what is taken is such.
+    #[test]
+    fn what_is_taken_more_often_counts_less() {
+        let value = |number: usize| if number % 100 == 7 { 50.0 } else { 1.0 };
+        let (all, sum) = (1000, (0..1000).map(value).sum::<f64>());
+        let chances = (0..all).map(|number| 0.5 * (1.0 / all as f64 + value(number) / sum));
+        let taken = systematic(chances, 200);
+        assert_eq!(taken.len(), 200);
+        let weighted =
+            taken.iter().map(|&(number, chance)| value(number) / (all as f64 * chance)).sum::<f64>();
+        assert!((weighted / 200.0 / (sum / all as f64) - 1.0).abs() < 0.02, "{weighted}");
+        let large = taken.iter().filter(|(number, _)| value(*number) > 1.0).count();
+        assert!((30..=40).contains(&large), "{large} of 200");
     }
 }

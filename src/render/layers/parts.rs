@@ -34,6 +34,11 @@ impl<'a> LightParts<'a> {
         }
     }
 
+    /// Of so many vertices, of which nothing is asked but how wrong their direct light is.
+    pub(in crate::render) fn of_error(vertices: usize) -> Self {
+        Self::new(vertices, None, false, true)
+    }
+
     /// What is asked for beside the sum of direct light: that of each group, and its error by vertex.
     pub(in crate::render) fn of_direct(&mut self) -> (Option<&mut GroupLight<'a>>, Option<&mut [Vec3]>) {
         (self.groups.as_mut(), self.error.as_deref_mut())

@@ -65,7 +65,7 @@ impl<A: Accel> View<'_, A> {
             };
             let found = timed(&mut seconds, || {
                 let count = self.pixels_for(&settings, meshes)?;
-                let mut held_out = HeldOut::by_brightness(&self.frame(&settings), &image, count)?;
+                let mut held_out = self.held_out_of(&image, &settings, count, meshes, &mut trial)?;
                 let errors = self.errors_of(&settings, meant, (&mut held_out, count), meshes, &mut trial)?;
                 Ok::<_, RenderError>(errors.estimate(Some(mean(&image))))
             });

@@ -1,10 +1,12 @@
 //! What is wrong with averaged shadows at pixels that are held out, by another light mesh (method §10).
 
 use crate::accel::Accel;
+use crate::image::Image;
 use crate::light_mesh::direct::{DirectEvaluation, DirectMesh};
 use crate::render::accuracy::{ErrorEstimate, Measure, PartError};
 use crate::render::error::RenderError;
 use crate::render::fixed::View;
+use crate::render::frame::BlockIntegrator;
 use crate::render::held_out::{HeldOut, Pixels};
 use crate::render::integrators::LightMeshIntegrator;
 use crate::render::memory::within;
@@ -17,6 +19,10 @@ use crate::settings::{Estimator, Settings};
 /// what is always spent, with which a frame of a tenth of a second says something about itself: they cost four times as much as camera rays.
 const MEASURED_BY_CAMERA: f64 = 0.02;
 const FEWEST_RAYS: f64 = 5e4;
+
+/// Pixels of a finished picture of which it is predicted how wrong they are, for each that is held out; and at most, as a share of the picture.
+const CANDIDATES: usize = 8;
+const LOOKED_AT: f64 = 1.0 / 32.0;
 
 /// Pixels that are held out at least, and at most.
 pub(super) const PIXELS: (usize, usize) = (96, 2048);
@@ -72,6 +78,28 @@ impl<A: Accel> View<'_, A> {
         let mut parts = errors(&shown.pixels, 1.0);
         parts.iter_mut().zip(&own).for_each(|(part, own)| part.wrong -= own.wrong);
         Ok(Errors { parts, rays })
+    }
+
+    /// Pixels of a finished picture by which it is judged: chosen by how bright they are, and of many of those by how much two halves of the
+    /// mesh points around them differ. A few pixels in a thousand make most of an RMSE.
+    pub(super) fn held_out_of(
+        &self,
+        image: &Image,
+        settings: &Settings,
+        count: usize,
+        meshes: &mut LightMeshes,
+        stats: &mut RenderStats,
+    ) -> Result<HeldOut, RenderError> {
+        let frame = self.frame(settings);
+        let candidates = (CANDIDATES * count).min((image.pixels().len() as f64 * LOOKED_AT) as usize);
+        let candidates = HeldOut::by_brightness(&frame, image, candidates.max(count))?;
+        let interpolation = meshes.interpolation(self.world.scene, self.camera, settings)?;
+        let (world, direct) = (self.world, &mut meshes.direct);
+        let mut integrator =
+            LightMeshIntegrator { world, direct, indirect: None, interpolation: &interpolation };
+        // Their points were needed by the picture and are known.
+        integrator.evaluate(&candidates.paths, stats);
+        candidates.by_prediction(&frame, &candidates.predicted(&integrator), count)
     }
 
     /// Direct light of the first `count` held-out pixels by a mesh, which may take so many bytes, if memory is limited.
