@@ -1,5 +1,7 @@
 //! One picture, by settings that leave nothing open.
 
+use std::sync::OnceLock;
+
 use super::choice::{WithTrial, choose, is_open};
 use super::error::RenderError;
 use super::film::TileSink;
@@ -12,6 +14,7 @@ use super::meshes::{LightMeshes, MeshInterpolation};
 use super::need::needed_points;
 use super::reason::{Choice, Reason};
 use super::settled::Settled;
+use super::spared::SparedRays;
 use super::stats::{RenderStats, timed};
 use super::surface_light::{SurfaceLight, WithSurfaceLight, evaluate_surface_light};
 use crate::accel::Accel;
@@ -34,12 +37,14 @@ pub(super) struct View<'a, A> {
     /// What is made of it.
     pub purpose: Purpose,
     pub layers: Option<&'a LayerCollector>,
+    /// What of its camera rays can be spared, found when the first are traced.
+    pub spared: &'a OnceLock<Option<SparedRays>>,
 }
 
 impl<A: Accel> View<'_, A> {
     /// The view, cut up.
     pub(super) fn frame<'a>(&'a self, settings: &'a Settings) -> Frame<'a, A> {
-        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop, self.purpose)
+        Frame::new(self.world, self.camera, &settings.view, self.sink, self.stop, self.purpose, self.spared)
             .with_layers(self.layers)
     }
 

@@ -1,7 +1,7 @@
 //! The stages of a frame, one after the other for each block of tiles: trace → need → evaluate → shade → film (method §9).
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use glam::Vec3;
@@ -11,9 +11,10 @@ use super::error::RenderError;
 use super::film::{TileSink, put_tile, resolve, resolve_block};
 use super::layers::{LayerCollector, LayerRecord, LightParts};
 use super::paths::TilePaths;
+use super::spared::SparedRays;
 use super::stats::{RenderStats, ShadeCounters, timed};
 use super::tiles::{TILES_PER_TASK, Tile, blocks};
-use super::trace::trace_paths;
+use super::trace::{WIDTH, trace_paths};
 use crate::accel::Accel;
 use crate::image::Image;
 use crate::scene::{Camera, CameraRays};
@@ -102,6 +103,8 @@ pub struct Frame<'a, A> {
     /// Its view.
     pub view: &'a ViewSettings,
     camera: CameraRays,
+    /// What of its camera rays can be spared.
+    spared: &'a OnceLock<Option<SparedRays>>,
     blocks: Vec<Vec<Tile>>,
     sink: &'a dyn TileSink,
     stop: &'a StopToken,
@@ -121,13 +124,14 @@ impl<'a, A: Accel> Frame<'a, A> {
         sink: &'a dyn TileSink,
         stop: &'a StopToken,
         purpose: Purpose,
+        spared: &'a OnceLock<Option<SparedRays>>,
     ) -> Self {
         let camera = CameraRays::new(camera, view.resolution, 1).with_samples(view.samples());
         let samples = u64::from(view.samples_per_pixel);
         let most = if samples == 1 { BLOCK_SAMPLES } else { BLOCK_MERGED_SAMPLES };
         let block_pixels = view.block_samples.unwrap_or(most) / samples;
         let blocks = blocks(view.resolution, block_pixels);
-        Self { world, view, camera, blocks, sink, stop, purpose, layers: None, kept: Vec::new() }
+        Self { world, view, camera, spared, blocks, sink, stop, purpose, layers: None, kept: Vec::new() }
     }
 
     /// Tells the sink that a picture begins, by settings that leave nothing open.
@@ -151,13 +155,25 @@ impl<'a, A: Accel> Frame<'a, A> {
         paths.resize_with(block.len(), || TilePaths::new(self.layers.is_some()));
         timed(&mut stats.seconds.paths, || {
             let tiles = block.par_iter().zip(&mut *paths).with_max_len(TILES_PER_TASK);
-            tiles.for_each(|(tile, paths)| trace_paths(self.world, &self.camera, self.view, tile, paths));
+            let spared = self.spared.get_or_init(|| self.spared()).as_ref();
+            tiles.for_each(|(tile, paths)| {
+                trace_paths(self.world, &self.camera, self.view, spared, tile, paths);
+            });
         });
         for tile in &*paths {
             stats.rays.camera += tile.camera_rays;
             stats.rays.reflection += tile.reflection_rays;
         }
         Ok(())
+    }
+
+    /// What of the view's camera rays can be spared, if pixels have so many that it pays to look.
+    fn spared(&self) -> Option<SparedRays> {
+        let samples = self.view.samples_per_pixel;
+        let pattern = self.view.samples();
+        let pattern = pattern.get(..samples as usize)?;
+        let is_dense = samples.is_multiple_of(WIDTH as u32);
+        is_dense.then(|| SparedRays::of_view(self.world.scene, &self.camera, self.view.resolution, pattern))
     }
 
     /// Calls `each` with the camera paths of every block before any of them is shaded, for what has to be known of the whole

@@ -27,6 +27,7 @@ mod scene_lights;
 mod session;
 mod settled;
 mod shadow_edges;
+mod spared;
 mod stats;
 mod steps;
 mod surface_group;
@@ -50,6 +51,7 @@ pub use paths::{PathVertex, TilePaths};
 pub use reason::{Choice, Reason};
 pub use session::{Session, render};
 pub use settled::Settled;
+pub use spared::SparedRays;
 pub use stats::{
     HybridError, MeshCounters, PointCounters, RayCounters, RenderStats, ShadeCounters, StageSeconds,
 };

@@ -1,6 +1,7 @@
 //! A scene that is rendered more than once: everything that outlives a view.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::Vec3;
 
@@ -178,7 +179,9 @@ impl Session {
         let before = self.settled_for(settings);
         let (world, meshes) = self.split(settings);
         let (sink, purpose) = (&(), Purpose::Meshes);
-        let view = View { world, camera, sink, stop, known: None, settled: None, layers: None, purpose };
+        let spared = &OnceLock::new();
+        let view =
+            View { world, camera, sink, stop, known: None, settled: None, layers: None, purpose, spared };
         let (settled, stats) = view.settle(&of_views(settings), before, meshes)?;
         self.settled = settled.map(|settled| (of_views(settings), settled));
         Ok(stats)
@@ -334,7 +337,8 @@ fn render_world<A: Accel>(
     camera.validate()?;
     let known = meshes.known_view(camera, settings).cloned();
     let of_file = known.as_ref().map(|known| known.settled.settings(settings));
-    let view = View { world, camera, sink, stop, known: known.as_ref(), settled, layers, purpose };
+    let spared = &OnceLock::new();
+    let view = View { world, camera, sink, stop, known: known.as_ref(), settled, layers, purpose, spared };
     let (image, mut stats) = view.render(of_file.as_ref().unwrap_or(settings), meshes)?;
     if let Some(known) = known {
         stats.accuracy = known.accuracy;

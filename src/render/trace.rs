@@ -7,6 +7,7 @@ use pulp::NullaryFnOnce;
 
 use super::merge::{SampleMerger, Seen};
 use super::paths::TilePaths;
+use super::spared::{Outline, SMALL, SeenTriangle, SparedRays};
 use super::tiles::Tile;
 use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
 use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene};
@@ -22,7 +23,7 @@ struct Pending {
 }
 
 /// Rays of a camera packet.
-const WIDTH: usize = 16;
+pub const WIDTH: usize = 16;
 
 /// All of them.
 const ALL: LaneMask = (1 << WIDTH) - 1;
@@ -35,13 +36,14 @@ pub fn trace_paths<A: Accel>(
     world: World<A>,
     camera: &CameraRays,
     view: &ViewSettings,
+    spared: Option<&SparedRays>,
     tile: &Tile,
     paths: &mut TilePaths,
 ) {
     if paths.first.is_some() {
-        vectorize(TracePaths::<A, true> { world, camera, view, tile, paths });
+        vectorize(TracePaths::<A, true> { world, camera, view, spared, tile, paths });
     } else {
-        vectorize(TracePaths::<A, false> { world, camera, view, tile, paths });
+        vectorize(TracePaths::<A, false> { world, camera, view, spared, tile, paths });
     }
 }
 
@@ -61,12 +63,29 @@ fn on_triangle_of(packet: &RayHitPacket<WIDTH>, lane: usize) -> LaneMask {
     same
 }
 
+/// The greatest depth of what some lanes of a packet of camera rays hit, infinite if that is nothing; `None` if they hit different triangles.
+#[inline(always)]
+fn common_depth(packet: &RayHitPacket<WIDTH>, lanes: LaneMask) -> Option<f32> {
+    let first = lanes.trailing_zeros() as usize % WIDTH;
+    if on_triangle_of(packet, first) & lanes != lanes {
+        return None;
+    }
+    let mut farthest = 0.0;
+    for lane in 0..WIDTH {
+        // Directions of camera rays are as long as that of their depth.
+        let depth = packet.ray.tfar[lane];
+        farthest = if lanes >> lane & 1 == 1 && depth > farthest { depth } else { farthest };
+    }
+    Some(farthest)
+}
+
 /// The camera paths of a tile, as work for the best instruction set. What `LAYERS` need is kept by code of its own: in passing it took a sixth of the
 /// time without any.
 struct TracePaths<'a, A, const LAYERS: bool> {
     world: World<'a, A>,
     camera: &'a CameraRays,
     view: &'a ViewSettings,
+    spared: Option<&'a SparedRays>,
     tile: &'a Tile,
     paths: &'a mut TilePaths,
 }
@@ -76,8 +95,8 @@ impl<A: Accel, const LAYERS: bool> NullaryFnOnce for TracePaths<'_, A, LAYERS> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { world, camera, view, tile, paths } = self;
-        trace_tile::<A, LAYERS>(world, camera, view, tile, paths);
+        let Self { world, camera, view, spared, tile, paths } = self;
+        trace_tile::<A, LAYERS>(world, camera, view, spared, tile, paths);
     }
 }
 
@@ -86,6 +105,7 @@ fn trace_tile<A: Accel, const LAYERS: bool>(
     world: World<A>,
     camera: &CameraRays,
     view: &ViewSettings,
+    spared: Option<&SparedRays>,
     tile: &Tile,
     paths: &mut TilePaths,
 ) {
@@ -96,7 +116,7 @@ fn trace_tile<A: Accel, const LAYERS: bool>(
     paths.origin_ends.clear();
     paths.radiance.clear();
     paths.radiance.resize(tile.pixels(), Vec3::ZERO);
-    paths.camera_rays = (tile.pixels() as u64) * u64::from(samples);
+    paths.camera_rays = 0;
     paths.reflection_rays = 0;
     if let Some(first) = &mut paths.first {
         first.start(camera, tile.pixels());
@@ -110,11 +130,13 @@ fn trace_tile<A: Accel, const LAYERS: bool>(
         square.clear();
         square.extend(pixels);
         let first = (tracer.paths.vertices.len(), tracer.reflections.len());
-        tracer.trace_square(camera, &square, 0..samples);
+        match spared.filter(|_| square.len() == WIDTH) {
+            Some(spared) => tracer.trace_by_parts(camera, spared, &square, samples),
+            None => tracer.trace_square(camera, &square, 0..samples),
+        }
         if more > 0 {
             tracer.merger.keep_mixed(&mut square, samples);
             tracer.trace_square(camera, &square, samples..samples + more);
-            tracer.paths.camera_rays += square.len() as u64 * u64::from(more);
         }
         tracer.merger.finish(tracer.paths);
         if more > 0 {
@@ -157,13 +179,14 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
             |x, y, pixel, sample| Pending { ray: camera.ray(x, y, sample), weight: Vec3::ONE, pixel };
         if samples.len() == 1 {
             let rays = pixels.iter().map(|&(x, y, pixel)| pending(x, y, pixel, samples.start));
+            self.paths.camera_rays += pixels.len() as u64;
             self.trace(rays, 1, Coherence::Coherent);
             return;
         }
         if samples.len().is_multiple_of(WIDTH) {
             for &(x, y, pixel) in pixels {
                 for first in samples.clone().step_by(WIDTH) {
-                    self.trace_pixel(camera, (x, y, pixel), first);
+                    self.trace_pixel(camera, (x, y, pixel), first, None);
                 }
             }
             return;
@@ -171,15 +194,77 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         let rays = pixels
             .iter()
             .flat_map(|&(x, y, pixel)| samples.clone().map(move |sample| pending(x, y, pixel, sample)));
+        self.paths.camera_rays += pixels.len() as u64 * samples.len() as u64;
         let mut rays = rays.peekable();
         while rays.peek().is_some() {
             self.trace(rays.by_ref().take(WIDTH), 1, Coherence::Coherent);
         }
     }
 
-    /// Traces sixteen samples of a pixel.
+    /// Takes up the camera rays of 4×4 pixels; samples that lie between others that see one triangle need none of their own.
     #[inline(always)]
-    fn trace_pixel(&mut self, camera: &CameraRays, (x, y, pixel): (u32, u32, u32), first: u32) {
+    fn trace_by_parts(
+        &mut self,
+        camera: &CameraRays,
+        spared: &SparedRays,
+        pixels: &[(u32, u32, u32)],
+        samples: u32,
+    ) {
+        let Some(&(left, top, _)) = pixels.first() else { return };
+        let SparedRays { large, small } = spared;
+        let parts = [(0, 0), (SMALL, 0), (0, SMALL), (SMALL, SMALL)].map(|(x, y)| (left + x, top + y));
+        let rays = self.trace_outline(camera, &large.outline, (left, top));
+        let depth = common_depth(&rays, large.outline.lanes());
+        let mut seen = [None; 4];
+        if depth.is_some_and(|depth| parts.iter().all(|&part| large.is_clear(part, depth))) {
+            seen = [Some(SeenTriangle::of_packet(self.scene, camera, &rays)); 4];
+        } else {
+            for (seen, (part, lanes)) in seen.iter_mut().zip(parts.into_iter().zip(large.outline.quarters)) {
+                // Where the first rays differ, or something thin lies before them, more would be for nothing.
+                if !common_depth(&rays, lanes).is_some_and(|depth| small.is_clear(part, depth)) {
+                    continue;
+                }
+                let rays = self.trace_outline(camera, &small.outline, part);
+                let depth = common_depth(&rays, small.outline.lanes());
+                if depth.is_some_and(|depth| small.is_clear(part, depth)) {
+                    *seen = Some(SeenTriangle::of_packet(self.scene, camera, &rays));
+                }
+            }
+        }
+        for &(x, y, pixel) in pixels {
+            let seen = seen[((y - top) / SMALL * 2 + (x - left) / SMALL) as usize];
+            for first in (0..samples).step_by(WIDTH) {
+                self.trace_pixel(camera, (x, y, pixel), first, seen);
+            }
+        }
+    }
+
+    /// Traces the outermost samples of a square of pixels, given by its upper left one.
+    #[inline(always)]
+    fn trace_outline(
+        &mut self,
+        camera: &CameraRays,
+        outline: &Outline,
+        (left, top): (u32, u32),
+    ) -> RayHitPacket<WIDTH> {
+        let mut packet = RayHitPacket::<WIDTH>::empty();
+        for (lane, &(x, y, sample)) in outline.samples.iter().enumerate() {
+            packet.set_lane(lane, &camera.ray(left + x, top + y, sample));
+        }
+        self.paths.camera_rays += outline.samples.len() as u64;
+        self.accel.intersect_packet(outline.lanes(), &mut packet, Coherence::Coherent);
+        packet
+    }
+
+    /// Takes up sixteen samples of a pixel; they are traced unless it is known what all of them see.
+    #[inline(always)]
+    fn trace_pixel(
+        &mut self,
+        camera: &CameraRays,
+        (x, y, pixel): (u32, u32, u32),
+        first: u32,
+        seen: Option<SeenTriangle>,
+    ) {
         let mut packet = RayHitPacket::<WIDTH>::empty();
         let origin = camera.origin();
         let [dir_x, dir_y, dir_z] = camera.directions(x, y, first);
@@ -188,7 +273,13 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         (ray.dir_x, ray.dir_y, ray.dir_z) = (dir_x, dir_y, dir_z);
         (ray.tnear, ray.tfar) = ([0.0; WIDTH], [f32::INFINITY; WIDTH]);
         (hit.geom_id, hit.inst_id) = ([INVALID_ID; WIDTH], [INVALID_ID; WIDTH]);
-        self.accel.intersect_packet(ALL, &mut packet, Coherence::Coherent);
+        match seen {
+            Some(seen) => seen.meet(&mut packet),
+            None => {
+                self.paths.camera_rays += WIDTH as u64;
+                self.accel.intersect_packet(ALL, &mut packet, Coherence::Coherent);
+            }
+        }
         let mut left = ALL;
         while left != 0 {
             let lanes = left & on_triangle_of(&packet, left.trailing_zeros() as usize);

@@ -107,12 +107,7 @@ impl Scene {
             let at = |lane: usize| a * (1.0 - u[lane] - v[lane]) + b * u[lane] + c * v[lane];
             each_lane(lanes).map(|lane| map.sample(at(lane)).0).sum::<Vec3>() * part
         });
-        let instance = &self.instances[hit.instance as usize];
-        let corners = self.meshes[instance.mesh as usize].corners(hit.triangle);
-        let [a, b, c] = match &instance.to_world {
-            Some(to_world) => corners.map(|corner| to_world.transform_point3(corner)),
-            None => corners,
-        };
+        let [a, b, c] = self.corners(hit);
         let positions = [0, 1, 2].map(|axis| {
             let (start, along_u, along_v) = (a[axis], b[axis] - a[axis], c[axis] - a[axis]);
             let mut positions = [0.0; LANES];
@@ -122,6 +117,17 @@ impl Scene {
             positions
         });
         (interaction, positions)
+    }
+
+    /// The corners of the triangle that was hit, in world space.
+    #[inline(always)]
+    pub(crate) fn corners(&self, hit: &Hit) -> [Vec3; 3] {
+        let instance = &self.instances[hit.instance as usize];
+        let corners = self.meshes[instance.mesh as usize].corners(hit.triangle);
+        match &instance.to_world {
+            Some(to_world) => corners.map(|corner| to_world.transform_point3(corner)),
+            None => corners,
+        }
     }
 
     /// The interaction at a hit; `color` is the colour of a texture, given the texture coordinates of the triangle's corners.

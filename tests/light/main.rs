@@ -26,3 +26,4 @@ mod real_scenes;
 mod reference;
 mod rows;
 mod session;
+mod spared_rays;
