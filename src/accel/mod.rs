@@ -24,4 +24,6 @@ pub use bvh::{BvhAccel, BvhError, SimdLevel};
 pub use embree::{EmbreeAccel, EmbreeError};
 pub use limits::{MAX_COORDINATE, MIN_DIRECTION, is_valid_ray, largest_coordinate, largest_coordinate_of};
 pub use memory::{Footprint, MemoryEstimate, MemoryLimitError, check_memory, parse_size};
-pub use packet::{Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane};
+pub use packet::{
+    Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, RayPacket, hit_of_lane, on_triangle_of,
+};

@@ -90,6 +90,22 @@ pub fn hit_of_lane<const N: usize>(packet: &RayHitPacket<N>, lane: usize) -> Opt
     })
 }
 
+/// The lanes of a packet that hit what a lane hit: the same triangle, or nothing.
+#[inline(always)]
+pub fn on_triangle_of<const N: usize>(packet: &RayHitPacket<N>, lane: usize) -> LaneMask {
+    let hits = &packet.hit;
+    let (geometry, instance) = (hits.geom_id[lane], hits.inst_id[lane]);
+    let nothing = geometry == INVALID_ID;
+    let triangle = hits.prim_id[lane];
+    let mut same = 0;
+    for other in 0..N {
+        let is_same = (hits.geom_id[other] == geometry)
+            & (nothing | ((hits.inst_id[other] == instance) & (hits.prim_id[other] == triangle)));
+        same |= LaneMask::from(is_same) << other;
+    }
+    same
+}
+
 /// Writes the closest hit of lane `lane`, for [`hit_of_lane`] to read.
 #[inline(always)]
 pub(super) fn set_hit_of_lane<const N: usize>(packet: &mut RayHitPacket<N>, lane: usize, hit: &Hit) {

@@ -7,9 +7,11 @@ use pulp::NullaryFnOnce;
 
 use super::merge::{SampleMerger, Seen};
 use super::paths::TilePaths;
-use super::spared::{Outline, SMALL, SeenTriangle, SparedRays};
+use super::spared::{SMALL, SeenTriangle, SparedRays};
 use super::tiles::Tile;
-use crate::accel::{Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane};
+use crate::accel::{
+    Accel, Coherence, INVALID_ID, LaneMask, PacketLanes, RayHitPacket, hit_of_lane, on_triangle_of,
+};
 use crate::scene::{CameraRays, Hit, Interaction, Ray, Scene};
 use crate::settings::ViewSettings;
 use crate::simd::{each_lane, vectorize};
@@ -45,38 +47,6 @@ pub fn trace_paths<A: Accel>(
     } else {
         vectorize(TracePaths::<A, false> { world, camera, view, spared, tile, paths });
     }
-}
-
-/// The lanes of a packet that hit what a lane hit: the same triangle, or nothing.
-#[inline(always)]
-fn on_triangle_of(packet: &RayHitPacket<WIDTH>, lane: usize) -> LaneMask {
-    let hits = &packet.hit;
-    let (geometry, instance) = (hits.geom_id[lane], hits.inst_id[lane]);
-    let nothing = geometry == INVALID_ID;
-    let triangle = hits.prim_id[lane];
-    let mut same = 0;
-    for other in 0..WIDTH {
-        let is_same = (hits.geom_id[other] == geometry)
-            & (nothing | ((hits.inst_id[other] == instance) & (hits.prim_id[other] == triangle)));
-        same |= LaneMask::from(is_same) << other;
-    }
-    same
-}
-
-/// The greatest depth of what some lanes of a packet of camera rays hit, infinite if that is nothing; `None` if they hit different triangles.
-#[inline(always)]
-fn common_depth(packet: &RayHitPacket<WIDTH>, lanes: LaneMask) -> Option<f32> {
-    let first = lanes.trailing_zeros() as usize % WIDTH;
-    if on_triangle_of(packet, first) & lanes != lanes {
-        return None;
-    }
-    let mut farthest = 0.0;
-    for lane in 0..WIDTH {
-        // Directions of camera rays are as long as that of their depth.
-        let depth = packet.ray.tfar[lane];
-        farthest = if lanes >> lane & 1 == 1 && depth > farthest { depth } else { farthest };
-    }
-    Some(farthest)
 }
 
 /// The camera paths of a tile, as work for the best instruction set. What `LAYERS` need is kept by code of its own: in passing it took a sixth of the
@@ -211,49 +181,15 @@ impl<A: Accel, const LAYERS: bool> Tracer<'_, A, LAYERS> {
         samples: u32,
     ) {
         let Some(&(left, top, _)) = pixels.first() else { return };
-        let SparedRays { large, small } = spared;
-        let parts = [(0, 0), (SMALL, 0), (0, SMALL), (SMALL, SMALL)].map(|(x, y)| (left + x, top + y));
-        let rays = self.trace_outline(camera, &large.outline, (left, top));
-        let depth = common_depth(&rays, large.outline.lanes());
-        let mut seen = [None; 4];
-        if depth.is_some_and(|depth| parts.iter().all(|&part| large.is_clear(part, depth))) {
-            seen = [Some(SeenTriangle::of_packet(self.scene, camera, &rays)); 4];
-        } else {
-            for (seen, (part, lanes)) in seen.iter_mut().zip(parts.into_iter().zip(large.outline.quarters)) {
-                // Where the first rays differ, or something thin lies before them, more would be for nothing.
-                if !common_depth(&rays, lanes).is_some_and(|depth| small.is_clear(part, depth)) {
-                    continue;
-                }
-                let rays = self.trace_outline(camera, &small.outline, part);
-                let depth = common_depth(&rays, small.outline.lanes());
-                if depth.is_some_and(|depth| small.is_clear(part, depth)) {
-                    *seen = Some(SeenTriangle::of_packet(self.scene, camera, &rays));
-                }
-            }
-        }
+        let corner = (left, top);
+        let rays = &mut self.paths.camera_rays;
+        let seen = spared.seen(self.accel, self.scene, camera, corner, rays);
         for &(x, y, pixel) in pixels {
             let seen = seen[((y - top) / SMALL * 2 + (x - left) / SMALL) as usize];
             for first in (0..samples).step_by(WIDTH) {
                 self.trace_pixel(camera, (x, y, pixel), first, seen);
             }
         }
-    }
-
-    /// Traces the outermost samples of a square of pixels, given by its upper left one.
-    #[inline(always)]
-    fn trace_outline(
-        &mut self,
-        camera: &CameraRays,
-        outline: &Outline,
-        (left, top): (u32, u32),
-    ) -> RayHitPacket<WIDTH> {
-        let mut packet = RayHitPacket::<WIDTH>::empty();
-        for (lane, &(x, y, sample)) in outline.samples.iter().enumerate() {
-            packet.set_lane(lane, &camera.ray(left + x, top + y, sample));
-        }
-        self.paths.camera_rays += outline.samples.len() as u64;
-        self.accel.intersect_packet(outline.lanes(), &mut packet, Coherence::Coherent);
-        packet
     }
 
     /// Takes up sixteen samples of a pixel; they are traced unless it is known what all of them see.

@@ -31,7 +31,7 @@ fn shining(scene: &mut Scene, random: &mut SplitMix64) -> u32 {
 
 /// Adds a triangle; every other one is placed, in a space of its own.
 fn add(scene: &mut Scene, corners: [Vec3; 3], material: u32) {
-    if scene.meshes.len() % 2 == 0 {
+    if scene.meshes.len().is_multiple_of(2) {
         scene.add(TriangleMesh::new(corners.map(Vec3::into).into(), vec![[0, 1, 2]]).with_material(material));
         return;
     }

@@ -4,8 +4,9 @@ use std::f32::consts::PI;
 
 use glam::Vec2;
 
-use crate::accel::LaneMask;
+use crate::accel::{Accel, Coherence, LaneMask, PacketLanes, RayHitPacket};
 use crate::sampling::convex_hull;
+use crate::scene::CameraRays;
 use crate::simd::LANES;
 
 /// The samples on the convex hull of all samples of a square of pixels, and one in the middle: a packet of rays.
@@ -53,6 +54,24 @@ impl Outline {
             lanes.fold(0, |mask, (lane, _)| mask | 1 << lane)
         };
         Self { quarters: [0, 1, 2, 3].map(quarter), samples, bounds, gap: widest_gap(&corners) }
+    }
+
+    /// Traces the outermost samples of a square of pixels, given by its upper left one, and counts them.
+    #[inline(always)]
+    pub fn trace<A: Accel>(
+        &self,
+        accel: &A,
+        camera: &CameraRays,
+        (left, top): (u32, u32),
+        rays: &mut u64,
+    ) -> RayHitPacket<LANES> {
+        let mut packet = RayHitPacket::<LANES>::empty();
+        for (lane, &(x, y, sample)) in self.samples.iter().enumerate() {
+            packet.set_lane(lane, &camera.ray(left + x, top + y, sample));
+        }
+        *rays += self.samples.len() as u64;
+        accel.intersect_packet(self.lanes(), &mut packet, Coherence::Coherent);
+        packet
     }
 
     /// The lanes of a packet that the samples take.

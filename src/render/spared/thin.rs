@@ -143,7 +143,7 @@ impl<const LEVELS: usize> Marks<LEVELS> {
         let square = SMALL as f32;
         let first = ((low - self.bounds[1][axis]) / square).ceil().max(0.0);
         let last = ((high - self.bounds[0][axis]) / square).floor().min(count as f32 - 1.0);
-        // Nothing that isn't a number gets through.
+        // What is no number may be anywhere: both functions take the other argument.
         (first <= last).then_some([first as u32, last as u32])
     }
 
@@ -158,7 +158,7 @@ impl<const LEVELS: usize> Marks<LEVELS> {
         if farthest <= 0.0 {
             return None;
         }
-        if corners.iter().any(|corner| !(corner.z > NEAR * farthest)) {
+        if !corners.iter().all(|corner| corner.z > NEAR * farthest) {
             return Some(([[0, self.size.0 - 1], [0, self.size.1 - 1]], 0.0));
         }
         let (mut low, mut high, mut depth) = (Vec2::INFINITY, Vec2::NEG_INFINITY, f32::INFINITY);
@@ -212,8 +212,9 @@ impl<const LEVELS: usize> Marks<LEVELS> {
         let area = (b - a).perp_dot(c - a).abs();
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         for (width, depths) in &self.levels {
-            // The least height of the triangle; what is no number is thin.
-            if masked || !(area >= width * longest) {
+            // Its least height decides; what is no number is thin.
+            let is_wide = area >= width * longest;
+            if masked || !is_wide {
                 self.mark(depths, corners);
                 continue;
             }
