@@ -102,7 +102,7 @@ fn traced(scene: &Scene, view: &ViewSettings, spare: bool) -> Vec<TilePaths> {
     })
 }
 
-/// Whatever is seen, however thin, cut off, hidden or transparent: with a third of the rays the picture is the one of all of them. Emission is what shows it, since it
+/// Whatever is seen, however thin, cut off, hidden or transparent: with fewer rays the picture is the one of all of them. Emission is what shows it, since it
 /// comes from each sample alone.
 #[test]
 fn rays_that_are_spared_would_have_met_the_same() {
