@@ -1,6 +1,6 @@
 //! Camera rays through the samples of pixels.
 
-use glam::{Affine3A, DVec3, Mat3A, Vec2, Vec3, Vec3A};
+use glam::{DVec3, Mat3A, Vec2, Vec3};
 
 use super::{Camera, PixelFootprint, Ray};
 use crate::sampling::pixel_pattern;
@@ -82,13 +82,11 @@ impl CameraRays {
         self.origin
     }
 
-    /// Maps positions in space to (column · depth, row · depth, depth): in pixels from the image's upper left corner, and from the eye.
-    pub(crate) fn to_image(&self) -> Affine3A {
+    /// Maps ways from the eye to (column · depth, row · depth, depth), in pixels from the image's upper left corner.
+    pub(crate) fn to_image(&self) -> Mat3A {
         let across = self.right / self.right.length_squared() + self.forward * self.middle.x;
         let down = self.down / self.down.length_squared() + self.forward * self.middle.y;
-        let rows = Mat3A::from_cols(across.into(), down.into(), self.forward.into());
-        let matrix3 = rows.transpose();
-        Affine3A { matrix3, translation: matrix3 * Vec3A::from(-self.origin) }
+        Mat3A::from_cols(across.into(), down.into(), self.forward.into()).transpose()
     }
 
     /// Directions of the rays of sixteen samples of a pixel, from one on, by axis.
@@ -148,7 +146,7 @@ mod tests {
         let rays = CameraRays::new(&camera, (200, 100), 1);
         for (x, y, t) in [(0, 0, 1.0), (199, 3, 7.5), (120, 99, 0.01)] {
             let ray = rays.ray(x, y, 0);
-            let seen = rays.to_image().transform_point3(ray.origin + ray.direction * t);
+            let seen = rays.to_image() * (ray.direction * t);
             let position = seen.truncate() / seen.z;
             let expected = Vec2::new(x as f32, y as f32) + 0.5;
             assert!(position.abs_diff_eq(expected, 2e-2) && (seen.z / t - 1.0).abs() < 1e-4, "{seen}");

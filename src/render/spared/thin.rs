@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use glam::{Affine3A, Vec2, Vec3A};
+use glam::{Affine3A, Mat3A, Vec2, Vec3A};
 use rayon::prelude::*;
 
 use super::SMALL;
@@ -42,16 +42,16 @@ impl ThinParts {
         let size = (resolution.0.div_ceil(SMALL), resolution.1.div_ceil(SMALL));
         let marks = Marks::new(size, bounds, gaps);
         let boxes: Vec<Bounds> = scene.meshes.par_iter().map(|mesh| mesh.bounds()).collect();
-        let to_image = camera.to_image();
+        let (from_eye, eye) = (camera.to_image(), camera.origin().into());
         let mut left = DENSE * u64::from(resolution.0) * u64::from(resolution.1);
-        let mut instances: Vec<(&TriangleMesh, Affine3A)> = Vec::new();
+        let mut instances: Vec<(&TriangleMesh, ToImage)> = Vec::new();
         for instance in &scene.instances {
             let Some((mesh, bounds)) =
                 scene.meshes.get(instance.mesh as usize).zip(boxes.get(instance.mesh as usize))
             else {
                 continue;
             };
-            let to_image = instance.to_world.map_or(to_image, |to_world| to_image * to_world);
+            let to_image = ToImage { to_world: instance.to_world, eye, from_eye };
             let Some((seen, depth)) = marks.seen_box(bounds, &to_image) else { continue };
             let triangles = mesh.triangles.len() as u64;
             if triangles > DENSE * pixels_of(&seen) {
@@ -68,8 +68,7 @@ impl ThinParts {
             let positions = mesh.positions.as_slice();
             mesh.triangles.par_chunks(CHUNK).enumerate().for_each(|(chunk, triangles)| {
                 for (triangle, corners) in (chunk * CHUNK..).zip(triangles) {
-                    let corners =
-                        corners.map(|corner| to_image.transform_point3a(positions[corner as usize].into()));
+                    let corners = corners.map(|corner| to_image.of(positions[corner as usize].into()));
                     marks.add(corners, scene.alpha_mask(mesh, triangle as u32).is_some());
                 }
             });
@@ -95,6 +94,21 @@ type SquareRange = [[u32; 2]; 2];
 fn pixels_of([columns, rows]: &SquareRange) -> u64 {
     let length = |[first, last]: &[u32; 2]| u64::from(last - first + 1) * u64::from(SMALL);
     length(columns) * length(rows)
+}
+
+/// Maps an instance's corners to what [`CameraRays::to_image`] gives. The eye is taken off before anything is scaled: far from the origin, rounding would move what is seen by pixels.
+struct ToImage {
+    to_world: Option<Affine3A>,
+    eye: Vec3A,
+    from_eye: Mat3A,
+}
+
+impl ToImage {
+    #[inline(always)]
+    fn of(&self, corner: Vec3A) -> Vec3A {
+        let corner = self.to_world.map_or(corner, |to_world| to_world.transform_point3a(corner));
+        self.from_eye * (corner - self.eye)
+    }
 }
 
 /// A corner as it is seen: where in the image, and at what depth.
@@ -148,10 +162,10 @@ impl<const LEVELS: usize> Marks<LEVELS> {
     }
 
     /// The squares that a box may be seen in, and its least depth.
-    fn seen_box(&self, bounds: &Bounds, to_image: &Affine3A) -> Option<(SquareRange, f32)> {
+    fn seen_box(&self, bounds: &Bounds, to_image: &ToImage) -> Option<(SquareRange, f32)> {
         let corner = |number: usize| {
             let end = |axis: usize| if number >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-            to_image.transform_point3a(Vec3A::new(end(0), end(1), end(2)))
+            to_image.of(Vec3A::new(end(0), end(1), end(2)))
         };
         let corners: [Vec3A; 8] = std::array::from_fn(corner);
         let farthest = corners.iter().fold(0.0f32, |far, corner| far.max(corner.z));
